@@ -1,0 +1,1 @@
+"""Handey Studio: locate parts in a pile, choose grasps, plan and place, and understand every decision."""

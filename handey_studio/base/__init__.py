@@ -1,0 +1,8 @@
+"""What every room uses: the ledger of tried options, progress and cancel, read-only arrays, errors a person can act on."""
+
+from handey_studio.base.arrays import Value, frozen_array
+from handey_studio.base.errors import BadInput
+from handey_studio.base.ledger import Entry, Ledger, rejected_counts
+from handey_studio.base.progress import Progress, Silent
+
+__all__ = ["BadInput", "Entry", "Ledger", "Progress", "Silent", "Value", "frozen_array", "rejected_counts"]

@@ -1,0 +1,80 @@
+"""The ledger: what a stage tried, and why each candidate fell.
+
+Everyone in this field asks their planner "why not?". Every search writes an entry for each option it looks at; the
+screen, the command line's JSON and the tests read these same entries.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One option that was tried.
+
+    `reason` says in a few words why it fell, and is None while nothing speaks against it. `value` is the number that
+    was measured and `limit` the number it was held against, both in `unit`. `bodies` names what collided, if anything.
+    """
+
+    id: int
+    parent: int | None
+    stage: str
+    option: str
+    reason: str | None = None
+    value: float | None = None
+    limit: float | None = None
+    unit: str = ""
+    bodies: tuple[str, ...] = ()
+
+
+class Ledger:
+    """Collects the entries of one search. It lives as long as the search does; results carry `entries`."""
+
+    def __init__(self) -> None:
+        self._entries: list[Entry] = []
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        return tuple(self._entries)
+
+    def add(
+        self,
+        stage: str,
+        option: str,
+        reason: str | None = None,
+        *,
+        parent: int | None = None,
+        value: float | None = None,
+        limit: float | None = None,
+        unit: str = "",
+        bodies: tuple[str, ...] = (),
+    ) -> int:
+        """Write an entry; its id."""
+        self._entries.append(Entry(len(self._entries), parent, stage, option, reason, value, limit, unit, bodies))
+        return self._entries[-1].id
+
+    def fall(
+        self,
+        entry: int,
+        reason: str,
+        *,
+        value: float | None = None,
+        limit: float | None = None,
+        unit: str = "",
+        bodies: tuple[str, ...] = (),
+    ) -> None:
+        """The option of `entry`, open until now, fell for `reason`."""
+        self._entries[entry] = replace(self._entries[entry], reason=reason, value=value, limit=limit, unit=unit, bodies=bodies)
+
+    def adopt(self, entries: Iterable[Entry], parent: int | None = None) -> None:
+        """Take over the entries of a stage that was called, below `parent`."""
+        offset = len(self._entries)
+        for entry in entries:
+            above = parent if entry.parent is None else entry.parent + offset
+            self._entries.append(replace(entry, id=entry.id + offset, parent=above))
+
+
+def rejected_counts(entries: Iterable[Entry]) -> dict[str, int]:
+    """How many options fell for each reason, most frequent first."""
+    return dict(Counter(entry.reason for entry in entries if entry.reason is not None).most_common())

@@ -1,0 +1,70 @@
+"""The values of a MOVE: the command, its plan step by step, and the result with everything that was tried."""
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from numpy.typing import NDArray
+
+from handey_studio.base import Entry, Value, frozen_array
+from handey_studio.motion import Certificate
+
+StepKind = Literal["free", "approach", "close", "lift", "transfer", "regrasp", "place", "open", "retreat"]
+
+
+@dataclass(frozen=True)
+class MoveCommand:
+    """MOVE `part` TO `to`. `part` is a part's name or an instance (`l_block#2`); `to` a destination as it was typed:
+    `x,y,z[,roll,pitch,yaw]` (metres, degrees) or `on:PART[:POSE]`."""
+
+    part: str
+    to: str
+
+
+@dataclass(frozen=True, eq=False)
+class Step(Value):
+    """One step of a plan: a timed joint path with the hand's opening, what it holds, and the pairs that may touch.
+
+    `q_rad` (n, joints), `time_s` (n,) from zero, `hand_opening_m` (n,). `T_hand_part` (4, 4) when something is held.
+    """
+
+    kind: StepKind
+    joint_names: tuple[str, ...]
+    time_s: NDArray
+    q_rad: NDArray
+    hand_opening_m: NDArray
+    held: str | None
+    T_hand_part: NDArray | None
+    allowed_contacts: tuple[tuple[str, str], ...]
+
+    def __post_init__(self) -> None:
+        for key in ("time_s", "q_rad", "hand_opening_m"):
+            object.__setattr__(self, key, frozen_array(getattr(self, key)))
+        if self.T_hand_part is not None:
+            object.__setattr__(self, "T_hand_part", frozen_array(self.T_hand_part))
+
+
+@dataclass(frozen=True, eq=False)
+class MovePlan(Value):
+    """A full plan. Poses (4, 4); `T_hand_part` is the grasp; the grasp's words (class, group, …) are in `grasp`."""
+
+    part: str
+    T_world_part_start: NDArray
+    T_world_part_goal: NDArray
+    grasp: dict[str, Any]
+    steps: tuple[Step, ...]
+    certificate: Certificate
+    regrasps: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class MoveResult(Value):
+    """What became of a MOVE. `ledger` holds everything that was tried; `timing_s` seconds a stage."""
+
+    command: MoveCommand
+    status: Literal["planned", "done", "failed"]
+    reason: str
+    plan: MovePlan | None
+    T_world_part_reached: NDArray | None = None
+    ledger: tuple[Entry, ...] = ()
+    timing_s: dict[str, float] = field(default_factory=dict)
+    physics: bool = False
