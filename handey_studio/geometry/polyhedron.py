@@ -242,7 +242,8 @@ def _check_no_self_intersection(corners: NDArray, triangles: NDArray) -> None:
             t = (d_p[maybe] / (d_p[maybe] - d_q[maybe]))[:, None]
             x = p + t * (q - p)
             n = normals[maybe]
-            inside = [np.einsum("ij,ij->i", np.cross(v - u, x - u), n) > 0 for u, v in ((a[maybe], b[maybe]), (b[maybe], c[maybe]), (c[maybe], a[maybe]))]
+            u = (a[maybe], b[maybe], c[maybe])
+            inside = [np.einsum("ij,ij->i", np.cross(u[k - 2] - u[k], x - u[k]), n) > 0 for k in range(3)]
             crossings += int(np.logical_and.reduce(inside).sum())
     if crossings:
         raise BadInput(f"its surface passes through itself at {crossings} places; a part must not intersect itself.")

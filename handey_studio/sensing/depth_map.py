@@ -36,7 +36,7 @@ class DepthMap(Value):
 
     def view(self) -> DepthView:
         """The map as an image, seen from above by parallel light; row 0 is the far side, y = ny·cell."""
-        ny, nx = self.elevation.shape
+        ny = len(self.elevation)
         T_range_sensor = transform(np.diag([1.0, -1.0, -1.0]), (0.0, ny * self.cell, VIEW_HEIGHT_M))
         return DepthView(
             VIEW_HEIGHT_M - self.elevation[::-1],

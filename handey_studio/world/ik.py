@@ -76,10 +76,9 @@ def _ur_branches(T06: NDArray, d1: float, a2: float, a3: float, d4: float, d5: f
             continue
         q5 = wrist * np.arccos(np.clip(cos5, -1, 1))
         s5 = np.sin(q5)
-        if abs(s5) < 1e-8:
-            q6 = 0.0  # wrist singularity: joints 4 and 6 turn about parallel axes; any share is right
-        else:
-            q6 = np.arctan2((-T06[0, 1] * s1 + T06[1, 1] * c1) / s5, (T06[0, 0] * s1 - T06[1, 0] * c1) / s5)
+        # At the wrist's singularity joints 4 and 6 turn about parallel axes; any share between them is right.
+        y6, x6 = -T06[0, 1] * s1 + T06[1, 1] * c1, T06[0, 0] * s1 - T06[1, 0] * c1
+        q6 = 0.0 if abs(s5) < 1e-8 else np.arctan2(y6 / s5, x6 / s5)
         T14 = inverse(_dh(q1, d1, 0, np.pi / 2)) @ T06 @ inverse(_dh(q5, d5, 0, -np.pi / 2) @ _dh(q6, d6, 0, 0))
         x, y = T14[:2, 3]
         cos3 = (x * x + y * y - a2 * a2 - a3 * a3) / (2 * a2 * a3)

@@ -99,7 +99,5 @@ def _read_mesh(path: Path) -> tuple[np.ndarray, list[list[int]]]:
     try:
         mesh = trimesh.load(path, force="mesh", process=False)
         return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces).tolist()
-    except OSError:
-        raise
-    except Exception as error:  # the mesh readers raise whatever their parsers stumble over
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, NotImplementedError) as error:  # the mesh readers' own
         raise BadInput(f'part model "{path}" cannot be read as a mesh: {error}.') from None

@@ -118,7 +118,8 @@ def _robot(table: dict[str, Any], folder: Path) -> Robot:
     urdf, packages = _urdf_path(table["urdf"], folder)
     base = table.get("base", {})
     limits = table["limits"]
-    per_joint = {key: _numbers(limits[key], key, len(joints)) for key in ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")}
+    columns = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
+    per_joint = {key: _numbers(limits[key], key, len(joints)) for key in columns}
     robot = Robot(
         name=table["name"],
         urdf=urdf,

@@ -1,6 +1,6 @@
 """The world: what the planner believes about the workcell. Nothing here knows how the world really is."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ class World(Value):
     blocks: tuple[Block, ...] = ()
     parts: tuple[PlacedPart, ...] = ()
     terrain: HeightField | None = None
-    free_space: NDArray = DEFAULT_FREE_SPACE
+    free_space: NDArray = field(default_factory=lambda: DEFAULT_FREE_SPACE)
 
     def part(self, name: str) -> PlacedPart:
         """The located instance of that name."""
