@@ -1,0 +1,5 @@
+"""Arm motion (Handey 1987 §4): slice configuration space, the three-leg path, its certificate, timing."""
+
+from handey_studio.motion.results import Certificate, CSpaceSummary, Leg, PathResult, Trajectory
+
+__all__ = ["CSpaceSummary", "Certificate", "Leg", "PathResult", "Trajectory"]
