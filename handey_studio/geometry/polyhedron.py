@@ -70,9 +70,7 @@ class Polyhedron(Value):
         """Every edge once, each with the two faces that meet there."""
         owner = {(a, b): f for f, face in enumerate(self.faces) for loop in face.loops for a, b in _sides(loop)}
         return tuple(
-            Edge(a, b, f, owner[b, a], self._dihedral(a, b, f, owner[b, a]))
-            for (a, b), f in owner.items()
-            if a < b and (b, a) in owner
+            Edge(a, b, f, owner[b, a], self._dihedral(a, b, f, owner[b, a])) for (a, b), f in owner.items() if a < b and (b, a) in owner
         )
 
     @cached_property

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from importlib import import_module
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import trimesh
 from numpy.typing import NDArray
 
@@ -12,6 +13,9 @@ from handey_studio.base import BadInput, frozen_array
 from handey_studio.geometry.transforms import inverse
 from handey_studio.world.ik import IK_SOLVERS
 from handey_studio.world.robot import Robot
+
+
+pin: Any = import_module("pinocchio")  # compiled, without type information
 
 
 @dataclass(frozen=True)
@@ -113,7 +117,7 @@ def _rotations(axis: NDArray, angles: NDArray) -> NDArray:
     return T
 
 
-def _joint_axis(model: pin.Model, joint: int) -> NDArray:
+def _joint_axis(model: Any, joint: int) -> NDArray:
     """Axis of a revolute joint in its own frame, read off its motion subspace."""
     data = model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))
@@ -123,11 +127,11 @@ def _joint_axis(model: pin.Model, joint: int) -> NDArray:
     return np.round(column[3:], 12)
 
 
-def _link_body(geometry: pin.GeometryObject) -> LinkBody:
+def _link_body(geometry: Any) -> LinkBody:
     """Mesh of a collision object in its link's frame."""
     path = geometry.meshPath
     if path and path not in ("BOX", "CYLINDER", "SPHERE"):
-        mesh = trimesh.load(path, force="mesh")
+        mesh = trimesh.load_mesh(path)
         mesh.apply_scale(np.asarray(geometry.meshScale).reshape(3))
     else:
         mesh = _primitive(geometry)
@@ -142,7 +146,7 @@ def _link_body(geometry: pin.GeometryObject) -> LinkBody:
     )
 
 
-def _primitive(geometry: pin.GeometryObject) -> trimesh.Trimesh:
+def _primitive(geometry: Any) -> trimesh.Trimesh:
     shape = geometry.geometry
     if hasattr(shape, "halfSide"):
         return trimesh.creation.box(2 * np.asarray(shape.halfSide))

@@ -97,7 +97,7 @@ def _read_obj(path: Path) -> tuple[np.ndarray, list[list[int]]]:
 
 def _read_mesh(path: Path) -> tuple[np.ndarray, list[list[int]]]:
     try:
-        mesh = trimesh.load(path, force="mesh", process=False)
+        mesh = trimesh.load_mesh(path, process=False)
         return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces).tolist()
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, NotImplementedError) as error:  # the mesh readers' own
         raise BadInput(f'part model "{path}" cannot be read as a mesh: {error}.') from None

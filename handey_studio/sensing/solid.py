@@ -1,0 +1,146 @@
+"""What a depth map makes solid: space that no reading vouches for.
+
+Below a reading everything is solid. A hole, where nothing was read, is solid up to the lowest light that passed over it and
+was read beyond it (the shadow's own slope), and never above the hole's rim. Readings that a located part explains leave
+the map with it, and only those; what it stood on stays solid up to the part's underside.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import ConvexHull
+
+from handey_studio.geometry import HeightField
+from handey_studio.geometry.transforms import apply, inverse
+from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.world import Part, PlacedPart
+
+EXPLAINED_SIGMAS = 4.0  # a reading this many standard deviations from a part's surface is still the part's
+
+
+def solid_columns(depth_map: DepthMap) -> HeightField:
+    """The columns that are solid before any part is explained."""
+    hole = np.isnan(depth_map.elevation)
+    top = np.where(hole, _rim(depth_map.elevation), depth_map.elevation)
+    vouched = np.full(hole.shape, np.inf)
+    for light in depth_map.lights:
+        vouched = np.minimum(vouched, _light_over_holes(np.array(depth_map.elevation), depth_map.cell, np.array(light)))
+    return HeightField(np.where(hole, np.minimum(top, vouched), top), depth_map.cell, depth_map.T_world_range)
+
+
+def without_parts(depth_map: DepthMap, columns: HeightField, placed: tuple[PlacedPart, ...]) -> HeightField:
+    """`columns` after the readings that the placed parts explain have left the map."""
+    top = columns.top.copy()
+    for part in placed:
+        own, underside = _explained(depth_map, part)
+        top[own] = np.minimum(top[own], underside[own])
+    return HeightField(top, columns.cell, columns.T_world_range)
+
+
+def explained_tolerance(depth_map: DepthMap) -> float:
+    """How far [m] from a part's surface a reading may lie and still be the part's: noise and outline error together."""
+    return EXPLAINED_SIGMAS * depth_map.noise + depth_map.outline_error
+
+
+def _rim(elevation: NDArray) -> NDArray:
+    """For every hole cell the greatest elevation around its hole; where a hole has no rim at all, infinity."""
+    labels, count = ndimage.label(np.isnan(elevation), structure=np.ones((3, 3)))
+    around = ndimage.maximum_filter(np.where(np.isnan(elevation), -np.inf, elevation), size=3)
+    rims = ndimage.maximum(around, labels, index=np.arange(1, count + 1)) if count else np.empty(0)
+    rims = np.where(np.isfinite(rims), rims, np.inf)
+    return np.concatenate([[0.0], np.atleast_1d(rims)])[labels]
+
+
+@njit(cache=True)
+def _light_over_holes(elevation: NDArray, cell: float, light: NDArray) -> NDArray:
+    """Height [m] at which light passes over each hole cell on its way to the next reading beyond; infinity if there is none."""
+    ny, nx = elevation.shape
+    height = np.full((ny, nx), np.inf)
+    for j in range(ny):
+        for i in range(nx):
+            if not np.isnan(elevation[j, i]):
+                continue
+            x, y = (i + 0.5) * cell - light[0], (j + 0.5) * cell - light[1]
+            distance = max(np.hypot(x, y), 1e-9)
+            dx, dy = x / distance, y / distance
+            along = 0.5 * cell
+            while True:
+                ii = int(np.floor((x + dx * along + light[0]) / cell))
+                jj = int(np.floor((y + dy * along + light[1]) / cell))
+                if ii < 0 or jj < 0 or ii >= nx or jj >= ny:
+                    break
+                e = elevation[jj, ii]
+                if not np.isnan(e):
+                    height[j, i] = e + (light[2] - e) * along / (distance + along)
+                    break
+                along += 0.5 * cell
+    return height
+
+
+@lru_cache(maxsize=32)
+def _half_spaces(part: Part) -> tuple[NDArray, ...]:
+    """For each convex piece its planes (m, 4): normal · x + offset ≤ 0 inside."""
+    return tuple(np.unique(np.round(ConvexHull(piece).equations, 12), axis=0) for piece in part.pieces)
+
+
+def _explained(depth_map: DepthMap, placed: PlacedPart) -> tuple[NDArray, NDArray]:
+    """Which cells the part explains (ny, nx), and its underside [m] there in the range frame."""
+    tolerance = explained_tolerance(depth_map)
+    T_range_part = inverse(depth_map.T_world_range) @ placed.T_world_part
+    footprint, underside = _underside(depth_map, apply(T_range_part, placed.part.solid.vertices), placed.part.solid.triangles)
+    if not footprint.any():
+        return footprint, underside
+    reach = int(np.ceil(tolerance / depth_map.cell))
+    near = ndimage.binary_dilation(footprint, ndimage.generate_binary_structure(2, 2), iterations=reach + 1)
+    nearest = ndimage.distance_transform_edt(~footprint, return_distances=False, return_indices=True)
+    underside = underside[nearest[0], nearest[1]]
+    j, i = np.nonzero(near)
+    cells = np.c_[(i + 0.5) * depth_map.cell, (j + 0.5) * depth_map.cell]
+    own = np.zeros_like(footprint)
+    own[j, i] = np.isnan(depth_map.elevation[j, i])
+    seen = ~own[j, i]
+    points = np.c_[cells[seen], depth_map.elevation[j[seen], i[seen]]]
+    own[j[seen], i[seen]] = _outside_by(placed.part, apply(inverse(T_range_part), points)) <= tolerance
+    gap = ndimage.distance_transform_edt(~footprint) * depth_map.cell
+    own &= ~(np.isnan(depth_map.elevation) & (gap > tolerance))
+    return own, underside
+
+
+def _outside_by(part: Part, points_part: NDArray) -> NDArray:
+    """How far [m] points (n, 3) lie outside the part, by its pieces' planes; negative inside."""
+    distances = [(points_part @ planes[:, :3].T + planes[:, 3]).max(axis=1) for planes in _half_spaces(part)]
+    return np.min(distances, axis=0)
+
+
+def _underside(depth_map: DepthMap, corners_range: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray]:
+    """Cells whose centre lies under the solid (ny, nx), and the solid's lowest z [m] there, infinity elsewhere."""
+    lowest = np.full(depth_map.elevation.shape, np.inf)
+    _lower_by_triangles(lowest, depth_map.cell, np.ascontiguousarray(corners_range[triangles]))
+    return np.isfinite(lowest), lowest
+
+
+@njit(cache=True)
+def _lower_by_triangles(lowest: NDArray, cell: float, triangles: NDArray) -> None:
+    """Lower each cell to the height of the triangles (k, 3, 3) above or below its centre."""
+    ny, nx = lowest.shape
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if abs(area) < 1e-14:
+            continue
+        i0 = max(0, int(np.floor(min(a[0], b[0], c[0]) / cell)))
+        i1 = min(nx - 1, int(np.floor(max(a[0], b[0], c[0]) / cell)))
+        j0 = max(0, int(np.floor(min(a[1], b[1], c[1]) / cell)))
+        j1 = min(ny - 1, int(np.floor(max(a[1], b[1], c[1]) / cell)))
+        for j in range(j0, j1 + 1):
+            for i in range(i0, i1 + 1):
+                x, y = (i + 0.5) * cell, (j + 0.5) * cell
+                v = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area
+                w = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area
+                if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
+                    z = a[2] + v * (b[2] - a[2]) + w * (c[2] - a[2])
+                    if z < lowest[j, i]:
+                        lowest[j, i] = z
