@@ -1,0 +1,23 @@
+"""One file that holds everything a user did: the Session value, the `.handey` file, and the plan played over time."""
+
+from handey_studio.session.checks import check_name, check_session
+from handey_studio.session.files import find_session, own_file, read_session, session_from_bytes, session_to_bytes, write_session
+from handey_studio.session.replay import Moment, Replay
+from handey_studio.session.session import LAYERS, Session, ViewState, new_session
+
+__all__ = [
+    "LAYERS",
+    "Moment",
+    "Replay",
+    "Session",
+    "ViewState",
+    "check_name",
+    "check_session",
+    "find_session",
+    "new_session",
+    "own_file",
+    "read_session",
+    "session_from_bytes",
+    "session_to_bytes",
+    "write_session",
+]

@@ -1,0 +1,127 @@
+"""What a session read from a file must hold before anyone trusts it."""
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from handey_studio.base import BadInput
+from handey_studio.geometry import Polyhedron, polyhedron_from_polygons
+from handey_studio.geometry.transforms import is_rigid
+from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.session.session import Session
+from handey_studio.task.plan import MovePlan
+
+MAX_NAME = 120
+MAX_PARTS, MAX_COMMANDS, MAX_RESULTS, MAX_BODIES = 200, 500, 500, 500
+MAX_MAP_SIDE, MAX_CELL_M = 4000, 0.05
+MAX_COORDINATE_M = 1e3
+ANY_NUMBER = ("elevation",)  # arrays in which NaN says that nothing was read
+
+
+def check_session(session: Session) -> None:
+    """Raises BadInput with one sentence when something in a session cannot be: its frames, numbers, shapes or counts."""
+    _check_counts(session)
+    for path, value in _walk(session, "session"):
+        if isinstance(value, np.ndarray):
+            _check_array(path, value)
+        elif isinstance(value, Polyhedron):
+            _check_solid(path, value)
+        elif isinstance(value, DepthMap):
+            _check_map(path, value)
+        elif isinstance(value, MovePlan):
+            _check_plan(path, value)
+
+
+def check_name(name: str) -> str:
+    """A session's name, which is also the name of its file: printable, no folder separators, not hidden."""
+    if (
+        not name
+        or len(name) > MAX_NAME
+        or name != name.strip()
+        or name.startswith(".")
+        or not name.isprintable()
+        or set(name) & set('/\\:*?"<>|')
+    ):
+        raise BadInput(f'the session name "{name[:60]}" cannot be used; give 1 to {MAX_NAME} letters, digits, spaces, "-" or "_".')
+    return name
+
+
+def _check_counts(session: Session) -> None:
+    check_name(session.name)
+    counts = (
+        ("parts", len(session.parts), MAX_PARTS),
+        ("located parts", len(session.located), MAX_PARTS),
+        ("commands", len(session.commands), MAX_COMMANDS),
+        ("results", len(session.results), MAX_RESULTS),
+        ("bodies", len(session.workcell.setup.bodies), MAX_BODIES),
+        ("blocks", len(session.workcell.blocks), MAX_BODIES),
+    )
+    for thing, count, limit in counts:
+        if count > limit:
+            raise BadInput(f"the session has {count} {thing}, the limit is {limit}.")
+    missing = sorted(set(session.workcell.parts) - {part.name for part in session.parts})
+    if missing:
+        raise BadInput(f"the session lacks the model of {', '.join(missing)}.")
+
+
+def _walk(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """Every value inside a session with its path, such as `session.scan.T_world_range`."""
+    yield path, value
+    if is_dataclass(value):
+        for f in fields(value):
+            yield from _walk(getattr(value, f.name), f"{path}.{f.name}")
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from _walk(item, f"{path}.{key}")
+    elif isinstance(value, tuple | list) and not (value and isinstance(value[0], int | float | str)):
+        for number, item in enumerate(value):
+            yield from _walk(item, f"{path}[{number}]")
+
+
+def _check_array(path: str, array: np.ndarray) -> None:
+    field = path.rsplit(".", 1)[-1].split("[")[0]
+    if field.startswith("T_") and not is_rigid(array):
+        raise BadInput(f"{path} is not a rigid 4×4 transform; its rotation must be proper and its numbers finite.")
+    if field not in ANY_NUMBER and array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise BadInput(f"{path} holds a number that is not finite.")
+    if field.startswith("T_") and np.abs(array[:3, 3]).max() > MAX_COORDINATE_M:
+        raise BadInput(f"{path} lies {np.abs(array[:3, 3]).max():.3g} m away, the limit is {MAX_COORDINATE_M:.0f} m.")
+
+
+def _check_solid(path: str, solid: Polyhedron) -> None:
+    """The surface must be a closed solid, by the same test that a model file passes."""
+    corners = {corner for face in solid.faces for loop in face.loops for corner in loop}
+    if solid.vertices.ndim != 2 or solid.vertices.shape[1:] != (3,) or not corners <= set(range(len(solid.vertices))):
+        raise BadInput(f"{path} has faces with corners that it lacks.")
+    if any(len(loop) < 3 for face in solid.faces for loop in face.loops):
+        raise BadInput(f"{path} has a face with fewer than 3 corners.")
+    try:
+        polyhedron_from_polygons(solid.vertices, solid.triangles.tolist())
+    except (ValueError, IndexError, shapely.errors.GEOSException) as error:
+        raise BadInput(f"{path} is not a closed solid: {error}") from None
+
+
+def _check_map(path: str, scan: DepthMap) -> None:
+    shape = scan.elevation.shape
+    if len(shape) != 2 or not all(1 <= n <= MAX_MAP_SIDE for n in shape) or scan.source.shape != shape:
+        raise BadInput(f"{path} has {shape} cells and {scan.source.shape} sources; both must be one grid of up to {MAX_MAP_SIDE} a side.")
+    if not 0 < scan.cell <= MAX_CELL_M or scan.lights.ndim != 2 or scan.lights.shape[1:] != (3,):
+        raise BadInput(f"{path} needs cells of up to {MAX_CELL_M * 1e3:.0f} mm and lights of three coordinates.")
+    if np.isinf(scan.elevation).any() or not np.isfinite([scan.noise, scan.outline_error]).all():
+        raise BadInput(f"{path} holds an infinite elevation or error.")
+
+
+def _check_plan(path: str, plan: MovePlan) -> None:
+    """Every step must have one opening and one configuration for each of its times, which do not run backwards."""
+    for number, step in enumerate(plan.steps):
+        n = len(step.time_s)
+        if step.time_s.shape != (n,) or n == 0 or step.q_rad.shape != (n, len(step.joint_names)) or step.hand_opening_m.shape != (n,):
+            raise BadInput(
+                f"{path}.steps[{number}] has times {step.time_s.shape}, joints {step.q_rad.shape} and openings {step.hand_opening_m.shape}; "
+                "each needs one row a time."
+            )
+        if (np.diff(step.time_s) < 0).any():
+            raise BadInput(f"{path}.steps[{number}] has times that run backwards.")

@@ -1,0 +1,79 @@
+"""A plan played over time: one time says where the arm, the fingers and the part are."""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Value
+from handey_studio.task.plan import MovePlan
+from handey_studio.world import Robot, arm_of
+
+
+@dataclass(frozen=True, eq=False)
+class Moment(Value):
+    """What holds at one time of a plan. `T_world_part` (4, 4) is where the moved part is; `step` counts the plan's steps."""
+
+    time_s: float
+    step: int
+    q_rad: NDArray
+    hand_opening_m: float
+    held: str | None
+    T_world_part: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Replay(Value):
+    """A plan on the robot that it was made for."""
+
+    robot: Robot
+    plan: MovePlan
+
+    @cached_property
+    def starts(self) -> tuple[float, ...]:
+        """When each step starts [s], and when the last one ends."""
+        ends = np.cumsum([0.0, *(float(step.time_s[-1]) for step in self.plan.steps)])
+        return tuple(ends.tolist())
+
+    @property
+    def duration(self) -> float:
+        """Length of the whole plan [s]."""
+        return self.starts[-1]
+
+    def step_at(self, time_s: float) -> int:
+        """Number of the step that runs at a time."""
+        return max(0, min(bisect_right(self.starts, time_s) - 1, len(self.plan.steps) - 1))
+
+    def at(self, time_s: float) -> Moment:
+        """What holds at a time [s], which is clipped to the plan's."""
+        time_s = float(np.clip(time_s, 0.0, self.duration))
+        number = self.step_at(time_s)
+        step = self.plan.steps[number]
+        local = time_s - self.starts[number]
+        q = np.array([np.interp(local, step.time_s, step.q_rad[:, joint]) for joint in range(step.q_rad.shape[1])])
+        opening = float(np.interp(local, step.time_s, step.hand_opening_m))
+        return Moment(time_s, number, q, opening, step.held, self._part_pose(number, q))
+
+    def hand_path(self, samples: int = 400) -> NDArray:
+        """Where the fingertips' middle goes: points (n, 3) [m] in the world, evenly in time."""
+        q = np.array([self.at(t).q_rad for t in np.linspace(0.0, self.duration, samples)])
+        return arm_of(self.robot).hand_pose(q)[:, :3, 3]
+
+    def _part_pose(self, number: int, q: NDArray) -> NDArray:
+        """T_world_part: in the hand while a step holds it, before that where it was found, after that where it was left."""
+        step = self.plan.steps[number]
+        if step.held is not None and step.T_hand_part is not None:
+            return arm_of(self.robot).hand_pose(q) @ step.T_hand_part
+        return self._resting[number]
+
+    @cached_property
+    def _resting(self) -> tuple[NDArray, ...]:
+        """For each step the pose in which the part was last let go."""
+        poses, T_world_part = [], self.plan.T_world_part_start
+        for step in self.plan.steps:
+            poses.append(T_world_part)
+            if step.held is not None and step.T_hand_part is not None:
+                T_world_part = arm_of(self.robot).hand_pose(step.q_rad[-1]) @ step.T_hand_part
+        return tuple(poses)

@@ -1,0 +1,85 @@
+"""Sessions made by hand: a small workcell, a scan of two blocks, and a plan that carries a part along a straight joint line."""
+
+import numpy as np
+
+from handey_studio.base import Ledger
+from handey_studio.cell.workcell import Workcell
+from handey_studio.geometry.transforms import from_xyz_rpy, inverse
+from handey_studio.motion import Certificate
+from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.session import Session, new_session
+from handey_studio.task.plan import MoveCommand, MovePlan, MoveResult, Step
+from handey_studio.world import Library, PlacedPart, Robot, arm_of
+
+T_START = from_xyz_rpy((0.48, 0.02, 0.0), (0.0, 0.0, 0.3))
+
+
+def hand_made_scan(cells: int = 80, cell: float = 0.005, seed: int = 0) -> DepthMap:
+    """A table with two blocks, a noisy reading a cell, and a few holes."""
+    rng = np.random.default_rng(seed)
+    elevation = rng.normal(0.0, 0.0003, (cells, cells))
+    elevation[20:32, 15:40] += 0.03
+    elevation[50:60, 50:58] += 0.055
+    elevation[rng.random(elevation.shape) < 0.02] = np.nan
+    T_world_range = from_xyz_rpy((0.48 - cells * cell / 2, -cells * cell / 2, 0.0))
+    return DepthMap(elevation, cell, T_world_range, np.array([[0.2, 0.2, 1.2]]), np.zeros(elevation.shape))
+
+
+def hand_made_plan(robot: Robot, part: str = "l_block#1") -> MovePlan:
+    """Reach, close, carry, open, retreat: no planner made it, but it is continuous and its frames agree."""
+    away = robot.home + np.array([0.4, 0.3, -0.2, 0.0, 0.0, 0.5])
+    there = robot.home + np.array([-0.6, 0.2, 0.1, 0.0, 0.0, -0.4])
+    T_hand_part = inverse(arm_of(robot).hand_pose(away)) @ T_START
+    goal = arm_of(robot).hand_pose(there) @ T_hand_part
+    steps = (
+        line(robot, "free", robot.home, away, (0.1, 0.1)),
+        line(robot, "close", away, away, (0.1, 0.04)),
+        line(robot, "transfer", away, there, (0.04, 0.04), T_hand_part, part),
+        line(robot, "open", there, there, (0.04, 0.1)),
+        line(robot, "retreat", there, robot.home, (0.1, 0.1)),
+    )
+    certificate = Certificate(0.004, (3, 0.5), ("finger_left", "depth map"), True, 0.001)
+    return MovePlan(part, T_START, goal, {"class": "faces 1 and 3", "T_part_hand": inverse(T_hand_part)}, steps, certificate)
+
+
+def line(robot: Robot, kind, start, end, opening, T_hand_part=None, held=None) -> Step:
+    """A step of two seconds in 21 samples."""
+    s = np.linspace(0.0, 1.0, 21)
+    q = start + s[:, None] * (np.asarray(end) - start)
+    return Step(kind, robot.joint_names, 2.0 * s, q, opening[0] + s * (opening[1] - opening[0]), held, T_hand_part, ())
+
+
+def ledger():
+    """A few entries of two stages, one of which fell without a number."""
+    book = Ledger()
+    search = book.add("move", "l_block#1 to the table")
+    for angle in range(0, 90, 30):
+        book.add("grasp", f"faces 1 and 3 at {angle}°", "tilted too far", parent=search, value=float(angle), limit=20.0, unit="deg")
+    book.add("grasp", "faces 2 and 4", "no inverse kinematics", parent=search, bodies=("wrist_3_link",))
+    book.add("grasp", "faces 0 and 5 at 0°", parent=search)
+    return book.entries
+
+
+def library(folder) -> Library:
+    """An empty library of the user's own, before the bundled one."""
+    return Library(folder)
+
+
+def fresh_session(folder) -> Session:
+    """A session in which nothing was done yet."""
+    command = MoveCommand("l_block", "0.35,-0.35,0,0,0,90")
+    return new_session("sample", Workcell(parts=("l_block", "brick")), library(folder), (command,), seed=7)
+
+
+def full_session(folder) -> Session:
+    """A session with a scan, located parts and a planned MOVE."""
+    from dataclasses import replace
+
+    session = fresh_session(folder)
+    plan = hand_made_plan(library(folder).robot("ur5"))
+    result = MoveResult(session.commands[0], "planned", "", plan, None, ledger(), {"sense": 1.25, "plan": 3.5})
+    located = (
+        PlacedPart("l_block#1", session.parts[0], T_START),
+        PlacedPart("brick#1", session.parts[1], from_xyz_rpy((0.42, -0.08, 0.0))),
+    )
+    return replace(session, scan=hand_made_scan(), located=located, results=(result,))
