@@ -11,10 +11,11 @@ from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron, polyhedron_from_polygons
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.sensing.depth_map import DepthMap
-from handey_studio.session.session import Session
+from handey_studio.session.session import Session, ViewState
 from handey_studio.task.plan import MovePlan
 
 MAX_NAME = 120
+NOT_IN_NAMES = '/\\:*?"<>|'
 MAX_PARTS, MAX_COMMANDS, MAX_RESULTS, MAX_BODIES = 200, 500, 500, 500
 MAX_MAP_SIDE, MAX_CELL_M = 4000, 0.05
 MAX_COORDINATE_M = 1e3
@@ -33,18 +34,14 @@ def check_session(session: Session) -> None:
             _check_map(path, value)
         elif isinstance(value, MovePlan):
             _check_plan(path, value)
+        elif isinstance(value, ViewState) and not value.camera_position.shape == value.camera_look_at.shape == (3,):
+            raise BadInput(f"{path} needs a camera position and a point to look at, three coordinates each.")
 
 
 def check_name(name: str) -> str:
     """A session's name, which is also the name of its file: printable, no folder separators, not hidden."""
-    if (
-        not name
-        or len(name) > MAX_NAME
-        or name != name.strip()
-        or name.startswith(".")
-        or not name.isprintable()
-        or set(name) & set('/\\:*?"<>|')
-    ):
+    fits = 0 < len(name) <= MAX_NAME and name == name.strip() and name.isprintable()
+    if not fits or name.startswith(".") or set(name) & set(NOT_IN_NAMES):
         raise BadInput(f'the session name "{name[:60]}" cannot be used; give 1 to {MAX_NAME} letters, digits, spaces, "-" or "_".')
     return name
 
@@ -118,10 +115,8 @@ def _check_plan(path: str, plan: MovePlan) -> None:
     """Every step must have one opening and one configuration for each of its times, which do not run backwards."""
     for number, step in enumerate(plan.steps):
         n = len(step.time_s)
-        if step.time_s.shape != (n,) or n == 0 or step.q_rad.shape != (n, len(step.joint_names)) or step.hand_opening_m.shape != (n,):
-            raise BadInput(
-                f"{path}.steps[{number}] has times {step.time_s.shape}, joints {step.q_rad.shape} and openings {step.hand_opening_m.shape}; "
-                "each needs one row a time."
-            )
+        shapes = (step.time_s.shape, step.q_rad.shape, step.hand_opening_m.shape)
+        if n == 0 or shapes != ((n,), (n, len(step.joint_names)), (n,)):
+            raise BadInput(f"{path}.steps[{number}] has times, joints and openings of shapes {shapes}; each needs one row a time.")
         if (np.diff(step.time_s) < 0).any():
             raise BadInput(f"{path}.steps[{number}] has times that run backwards.")

@@ -3,6 +3,7 @@
 import gzip
 import io
 import os
+import re
 import tempfile
 import zlib
 from pathlib import Path
@@ -95,18 +96,11 @@ def own_file(library: Library, name: str) -> Path:
 def check_version(plain: Any) -> None:
     """Refuses what is not a session, and one from a newer version."""
     schema = plain.get("schema") if isinstance(plain, dict) else None
-    if (
-        not isinstance(schema, str)
-        or not schema.startswith(SCHEMA)
-        or not schema.removeprefix(SCHEMA).isascii()
-        or not schema.removeprefix(SCHEMA).isdigit()
-    ):
+    match = re.fullmatch(rf"{SCHEMA}([0-9]{{1,9}})", schema) if isinstance(schema, str) else None
+    if match is None or int(match[1]) < 1:
         raise BadInput(f'it is not a Handey Studio session: its "schema" must be "{SCHEMA}{VERSION}".')
-    number = schema.removeprefix(SCHEMA)[:9]
-    if int(number) > VERSION:
-        raise BadInput(f"it has format {number}, this version of Handey Studio reads up to {VERSION}; update Handey Studio.")
-    if int(number) < 1:
-        raise BadInput(f'format {number} does not exist; "schema" must be "{SCHEMA}{VERSION}".')
+    if int(match[1]) > VERSION:
+        raise BadInput(f"it has format {match[1]}, this version of Handey Studio reads up to {VERSION}; update Handey Studio.")
 
 
 def _inflated(data: bytes) -> bytes:

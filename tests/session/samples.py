@@ -1,5 +1,7 @@
 """Sessions made by hand: a small workcell, a scan of two blocks, and a plan that carries a part along a straight joint line."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from handey_studio.base import Ledger
@@ -73,13 +75,9 @@ def fresh_session(folder) -> Session:
 
 def full_session(folder) -> Session:
     """A session with a scan, located parts and a planned MOVE."""
-    from dataclasses import replace
-
     session = fresh_session(folder)
     plan = hand_made_plan(library(folder).robot("ur5"))
     result = MoveResult(session.commands[0], "planned", "", plan, None, ledger(), {"sense": 1.25, "plan": 3.5})
-    located = (
-        PlacedPart("l_block#1", session.parts[0], T_START),
-        PlacedPart("brick#1", session.parts[1], from_xyz_rpy((0.42, -0.08, 0.0))),
-    )
+    brick = PlacedPart("brick#1", session.parts[1], from_xyz_rpy((0.42, -0.08, 0.0)))
+    located = (PlacedPart("l_block#1", session.parts[0], T_START), brick)
     return replace(session, scan=hand_made_scan(), located=located, results=(result,))
