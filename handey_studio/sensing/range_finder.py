@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from handey_studio.base import BadInput, Value, frozen_array
-from handey_studio.geometry.transforms import apply, is_rigid, transform
+from handey_studio.geometry.transforms import is_rigid, transform
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.sensing.depth_view import Pinhole
 
@@ -26,8 +26,8 @@ class StripeCamera(Value):
 
     T_range_camera: NDArray
     focal_px: float = 1500.0
-    width: int = 800
-    height: int = 680
+    width: int = 820
+    height: int = 720
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_range_camera", frozen_array(self.T_range_camera))
@@ -50,8 +50,8 @@ def camera_looking_at(position: ArrayLike, target: ArrayLike) -> StripeCamera:
 
 
 def _default_cameras() -> tuple[StripeCamera, ...]:
-    centre = np.array([AREA_M / 2, AREA_M / 2, 0.0])
-    return tuple(camera_looking_at(centre + (side * 0.4, 0.0, 1.1), centre + (0.0, 0.0, 0.03)) for side in (-1, 1))
+    middle = AREA_M / 2
+    return tuple(camera_looking_at((middle + x, middle, 1.1), (middle, middle, 0.05)) for x in (-0.4, 0.4))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class RangeFinder(Value):
             raise BadInput("the range finder's T_world_range must be rigid with z up, as the robot's.")
         if not 0.0001 <= self.cell <= 0.02 or not all(self.cell < side <= 4.0 for side in self.area):
             raise BadInput(
-                f"the scan area {self.area} m in cells of {self.cell} m is not usable; cells take 0.0001–0.02 m, sides up to 4 m."
+                f"a scan area of {self.area} m in cells of {self.cell} m is not usable; cells take 0.0001–0.02 m, sides up to 4 m."
             )
         if self.planes < 2 or not 0 < self.sweep_rad < 1.0 or not self.cameras:
             raise BadInput("the range finder needs a camera, at least 2 laser planes and a sweep between 0 and 1 rad.")
