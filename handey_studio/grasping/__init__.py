@@ -1,0 +1,29 @@
+"""§5: grasp classes and approach groups, legal rotations, and the bump-line approach in the grasp plane."""
+
+from handey_studio.grasping.bump_lines import BumpLines, BumpOptions, BumpRun, bump_lines, plan_approach
+from handey_studio.grasping.classes import GraspClass, GraspGroup, contact_area, grasp_classes, grasp_groups, hand_in_plane, opening_around
+from handey_studio.grasping.grasp_plane import GraspPlane, fill_grasp_plane
+from handey_studio.grasping.rotations import HAND_MARGIN_M, GraspEnd, LegalRotations, angle_range, legal_rotations, tilt
+
+__all__ = [
+    "HAND_MARGIN_M",
+    "BumpLines",
+    "BumpOptions",
+    "BumpRun",
+    "GraspClass",
+    "GraspEnd",
+    "GraspGroup",
+    "GraspPlane",
+    "LegalRotations",
+    "angle_range",
+    "bump_lines",
+    "contact_area",
+    "fill_grasp_plane",
+    "grasp_classes",
+    "grasp_groups",
+    "hand_in_plane",
+    "legal_rotations",
+    "opening_around",
+    "plan_approach",
+    "tilt",
+]

@@ -1,12 +1,13 @@
 """The values of a MOVE: the command, its plan step by step, and the result with everything that was tried."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 from numpy.typing import NDArray
 
 from handey_studio.base import Entry, Value, frozen_array
-from handey_studio.motion import Certificate
+from handey_studio.grasping.bump_lines import BumpRun
+from handey_studio.motion import Certificate, CSpaceSummary
 
 StepKind = Literal["free", "approach", "close", "lift", "transfer", "regrasp", "place", "open", "retreat"]
 
@@ -44,26 +45,62 @@ class Step(Value):
 
 
 @dataclass(frozen=True, eq=False)
+class GraspChoice(Value):
+    """The grasp that a plan uses: its class and approach group in words and numbers.
+
+    `T_hand_part` (4, 4) is the grasp itself. `faces` are the two grasped faces, `edge_part` (2, 3) [m] the edge that is crossed first, both
+    of the part; `contact_part` (k, 3) [m] the outline of where the faces face each other, in the grasp plane. `angle` and the
+    legal `ranges` (m, 2) [rad] are hand angles in the grasp plane. `tilts` [rad] of the fingers from straight down at pickup and putdown.
+    """
+
+    name: str
+    faces: tuple[int, int]
+    group: str
+    T_hand_part: NDArray
+    T_part_plane: NDArray
+    edge_part: NDArray
+    contact_part: NDArray
+    angle: float
+    ranges: NDArray
+    tilts: tuple[float, float]
+    width: float
+    opening: float
+    contact_area: float
+    joint_margin: float
+
+    def __post_init__(self) -> None:
+        for key in ("T_hand_part", "T_part_plane", "edge_part", "contact_part", "ranges"):
+            object.__setattr__(self, key, frozen_array(getattr(self, key)))
+
+
+@dataclass(frozen=True, eq=False)
 class MovePlan(Value):
-    """A full plan. Poses (4, 4); `T_hand_part` is the grasp; the grasp's words (class, group, …) are in `grasp`."""
+    """A full plan. Poses (4, 4). `approach` is the bump-line run at the pickup, `space` the configuration space of the transfer."""
 
     part: str
     T_world_part_start: NDArray
     T_world_part_goal: NDArray
-    grasp: dict[str, Any]
+    grasp: GraspChoice
     steps: tuple[Step, ...]
     certificate: Certificate
+    approach: BumpRun
+    space: CSpaceSummary | None = None
     regrasps: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class MoveResult(Value):
-    """What became of a MOVE. `ledger` holds everything that was tried; `timing_s` seconds a stage."""
+    """What became of a MOVE. `ledger` holds everything that was tried; `timing_s` seconds a stage.
+
+    `T_world_part_start` and `T_world_part_goal` are known as soon as the part was located and the destination understood.
+    """
 
     command: MoveCommand
     status: Literal["planned", "done", "failed"]
     reason: str
-    plan: MovePlan | None
+    plan: MovePlan | None = None
+    T_world_part_start: NDArray | None = None
+    T_world_part_goal: NDArray | None = None
     T_world_part_reached: NDArray | None = None
     ledger: tuple[Entry, ...] = ()
     timing_s: dict[str, float] = field(default_factory=dict)

@@ -31,7 +31,7 @@ def read_part(path: str | os.PathLike, scale: float = 1.0) -> Part:
             raise BadInput(f'the sidecar "{sidecar}" cannot be read as TOML: {error}.') from None
     try:
         mates = {
-            name: Mate(mate["on"], from_xyz_rpy(mate["xyz_m"], np.deg2rad(mate.get("rpy_deg", (0, 0, 0)))))
+            name: Mate(mate["part"], from_xyz_rpy(mate["xyz_m"], np.deg2rad(mate.get("rpy_deg", (0, 0, 0)))))
             for name, mate in table.get("mates", {}).items()
         }
         return Part(

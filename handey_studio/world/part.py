@@ -12,13 +12,14 @@ from handey_studio.geometry import Polyhedron, convex_pieces, symmetries
 
 @dataclass(frozen=True, eq=False)
 class Mate(Value):
-    """A mating pose: where this part stands when it fits onto another one. `T_other_part` (4, 4) maps it to the other's frame."""
+    """A mating pose: where `part` stands when it fits onto the part that names this mate. `T_this_part` (4, 4) maps the one
+    to the other's frame."""
 
-    other: str
-    T_other_part: NDArray
+    part: str
+    T_this_part: NDArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T_other_part", frozen_array(self.T_other_part))
+        object.__setattr__(self, "T_this_part", frozen_array(self.T_this_part))
 
 
 @dataclass(frozen=True, eq=False)
