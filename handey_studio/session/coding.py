@@ -31,7 +31,7 @@ def from_plain(plain: Any, kind: type[T]) -> T:
     """The value of a kind (a dataclass) from what `to_plain` made. Raises BadInput with one sentence."""
     try:
         return msgspec.convert(_with_arrays(plain), kind, dec_hook=_as_array)
-    except msgspec.ValidationError as error:
+    except (msgspec.ValidationError, AttributeError) as error:  # an array where a mapping belongs has no keys
         raise BadInput(f"{str(error).rstrip('.')}.") from None
 
 
