@@ -1,0 +1,220 @@
+"""Extended linear segments in space: edge pixels linked while they stay on one line, then fitted in three dimensions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from handey_studio.base import Value, frozen_array
+from handey_studio.localization.edges import CONCAVE, CONVEX, JUMP, KIND_NAMES, EdgePixels
+from handey_studio.localization.surface import Surface
+from handey_studio.sensing.depth_view import DepthView
+
+MIN_PIXELS = 10
+MAX_TURN = np.deg2rad(30.0)  # a pixel's own direction against the segment's: pixel directions are rough
+TRIM = 2.5  # sigmas; two rounds of trimming take the corners' rounding off a segment
+
+
+@dataclass(frozen=True, eq=False)
+class DataEdge(Value):
+    """A straight edge found in the depth map. `kind` is jump, convex or concave.
+
+    `ends_sensor` and `ends_world` (2, 3) [m]. `normals_sensor` (k, 3) are those of the surfaces that meet at it and are
+    seen, one at a jump, two at a crease; `inward_sensor` (k, 3) points from the edge into each of them. `rms` [m] is
+    how far its pixels lie off the line.
+    """
+
+    kind: str
+    ends_sensor: NDArray
+    ends_world: NDArray
+    normals_sensor: NDArray
+    inward_sensor: NDArray
+    pixels: int
+    rms: float
+
+    def __post_init__(self) -> None:
+        for key in ("ends_sensor", "ends_world", "normals_sensor", "inward_sensor"):
+            object.__setattr__(self, key, frozen_array(getattr(self, key)))
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return float(np.linalg.norm(self.ends_sensor[1] - self.ends_sensor[0]))
+
+    @property
+    def direction(self) -> NDArray:
+        """Unit direction (3,) from the first end to the second, in the sensor's frame."""
+        return (self.ends_sensor[1] - self.ends_sensor[0]) / self.length
+
+
+@dataclass(frozen=True, eq=False)
+class Linked(Value):
+    """Edge pixels (n,) as `u`, `v` [px], their `kind`, their direction `theta` [rad] in the image, and `segment`, −1 for none."""
+
+    u: NDArray
+    v: NDArray
+    kind: NDArray
+    theta: NDArray
+    segment: NDArray
+
+
+def link(view: DepthView, surface: Surface, edges: EdgePixels) -> Linked:
+    """Edge pixels linked to straight segments."""
+    v, u = np.nonzero(edges.kind)
+    kind = edges.kind[v, u].astype(np.int64)
+    number = np.full(view.depth.shape, -1, dtype=np.int64)
+    number[v, u] = np.arange(len(u))
+    across = max(1.0, 0.8 * view.outline_error / surface.pixel)  # px that a pixel may lie off its line
+    ragged = across > 1.5
+    gate = 6.0 * view.noise + 3.0 * surface.pixel
+    theta, quality = _directions(number, u, v, kind, view.depth, gate, 7 if ragged else 4)
+    order = np.argsort(-quality, kind="stable")
+    segment = _grow(number, u, v, kind, view.depth, theta, order, (across, gate, MAX_TURN, 3.0 if ragged else 2.0))
+    return Linked(u, v, kind, theta, segment)
+
+
+def data_edges(view: DepthView, surface: Surface, edges: EdgePixels, linked: Linked, min_length: float) -> tuple[DataEdge, ...]:
+    """Segments of at least `min_length` [m], fitted in space, longest first."""
+    order = np.argsort(linked.segment, kind="stable")
+    order = order[linked.segment[order] >= 0]
+    cuts = np.nonzero(np.diff(linked.segment[order]))[0] + 1
+    found = [_fit(view, surface, edges, linked, members) for members in np.split(order, cuts) if len(members)]
+    return tuple(sorted((edge for edge in found if edge is not None and edge.length >= min_length), key=lambda edge: -edge.length))
+
+
+def _fit(view: DepthView, surface: Surface, edges: EdgePixels, linked: Linked, members: NDArray) -> DataEdge | None:
+    """A line in space through a segment's pixels, by trimmed total least squares; None when too little stays on it."""
+    kind = int(np.bincount(linked.kind[members]).argmax())
+    points = surface.points[linked.v[members], linked.u[members]]
+    keep = np.isfinite(points).all(axis=1)
+    for _ in range(3):
+        if keep.sum() < MIN_PIXELS:
+            return None
+        centre = points[keep].mean(axis=0)
+        direction = np.linalg.svd(points[keep] - centre, full_matrices=False)[2][0]
+        off = np.linalg.norm((points - centre) - ((points - centre) @ direction)[:, None] * direction, axis=1)
+        rms = float(np.sqrt(np.mean(off[keep] ** 2)))
+        keep = np.isfinite(off) & (off <= TRIM * max(rms, 0.3 * view.noise))
+    along = (points[keep] - centre) @ direction
+    ends = centre + np.array([along.min(), along.max()])[:, None] * direction
+    u, v = linked.u[members][keep], linked.v[members][keep]
+    normals, inward = _flanks(surface, edges, kind, u, v, direction)
+    ends_world = ends @ view.T_world_sensor[:3, :3].T + view.T_world_sensor[:3, 3]
+    return DataEdge(KIND_NAMES[kind], ends, ends_world, normals, inward, int(keep.sum()), rms)
+
+
+def _flanks(surface: Surface, edges: EdgePixels, kind: int, u: NDArray, v: NDArray, direction: NDArray) -> tuple[NDArray, NDArray]:
+    """Normals and inward directions (k, 3) of the surfaces that meet at an edge, from pixels beside it."""
+    if kind == JUMP:
+        sides = [-edges.outward[v, u].sum(axis=0)]
+    else:
+        spread = np.linalg.svd(np.c_[u - u.mean(), v - v.mean()], full_matrices=False)[2][1]
+        sides = [spread, -spread]
+    normals, inward = [], []
+    for side in sides:
+        step = np.rint(side / max(np.linalg.norm(side), 1e-9) * (1.0 if kind == JUMP else surface.radius_px + 1.0)).astype(int)
+        x = np.clip(u + step[0], 0, surface.points.shape[1] - 1)
+        y = np.clip(v + step[1], 0, surface.points.shape[0] - 1)
+        known = np.isfinite(surface.normals[y, x]).all(axis=1)
+        if not known.any():
+            continue
+        normal = np.median(surface.normals[y, x][known], axis=0)
+        towards = np.median((surface.points[y, x] - surface.points[v, u])[known], axis=0)
+        normal = normal - (normal @ direction) * direction  # the surface holds the edge
+        if np.linalg.norm(normal) < 0.5:
+            continue
+        normal /= np.linalg.norm(normal)
+        in_plane = np.cross(normal, direction)
+        normals.append(normal)
+        inward.append(in_plane if in_plane @ towards > 0 else -in_plane)
+    return np.array(normals).reshape(-1, 3), np.array(inward).reshape(-1, 3)
+
+
+@njit(cache=True)
+def _directions(number: NDArray, u: NDArray, v: NDArray, kind: NDArray, depth: NDArray, gate: float, radius: int) -> tuple[NDArray, NDArray]:
+    """Direction [rad] of each edge pixel's neighbourhood in the image, and how much it is a line: length times straightness."""
+    height, width = number.shape
+    theta, quality = np.zeros(len(u)), np.zeros(len(u))
+    for i in range(len(u)):
+        n = sx = sy = sxx = sxy = syy = 0.0
+        for dv in range(-radius, radius + 1):
+            for du in range(-radius, radius + 1):
+                y, x = v[i] + dv, u[i] + du
+                if y < 0 or x < 0 or y >= height or x >= width:
+                    continue
+                j = number[y, x]
+                if j < 0 or kind[j] != kind[i] or abs(depth[y, x] - depth[v[i], u[i]]) > gate * (1 + max(abs(du), abs(dv))):
+                    continue
+                n += 1.0
+                sx, sy = sx + du, sy + dv
+                sxx, sxy, syy = sxx + du * du, sxy + du * dv, syy + dv * dv
+        if n < 3:
+            continue
+        sxx, sxy, syy = sxx - sx * sx / n, sxy - sx * sy / n, syy - sy * sy / n
+        theta[i] = 0.5 * np.arctan2(2 * sxy, sxx - syy)
+        spread = np.sqrt((sxx - syy) ** 2 + 4 * sxy * sxy)
+        quality[i] = spread * spread / max(sxx + syy, 1e-9)
+    return theta, quality
+
+
+@njit(cache=True)
+def _grow(
+    number: NDArray,
+    u: NDArray,
+    v: NDArray,
+    kind: NDArray,
+    depth: NDArray,
+    theta: NDArray,
+    order: NDArray,
+    limits: tuple[float, float, float, float],
+) -> NDArray:
+    """Segment number (n,) of each edge pixel, −1 for none: grown from the straightest places while pixels stay on one line."""
+    across, gate, max_turn, reach = limits
+    r = int(reach)
+    height, width = number.shape
+    segment = np.full(len(u), -1)
+    members = np.empty(len(u), dtype=np.int64)
+    count = 0
+    for seed in order:
+        if segment[seed] >= 0:
+            continue
+        n = 1
+        members[0] = seed
+        segment[seed] = count
+        angle = theta[seed]
+        cx, cy = float(u[seed]), float(v[seed])
+        sxx = sxy = syy = 0.0
+        head = 0
+        while head < n:
+            i = members[head]
+            head += 1
+            for dv in range(-r, r + 1):
+                for du in range(-r, r + 1):
+                    y, x = v[i] + dv, u[i] + du
+                    if y < 0 or x < 0 or y >= height or x >= width:
+                        continue
+                    j = number[y, x]
+                    if j < 0 or segment[j] >= 0 or kind[j] != kind[seed]:
+                        continue
+                    turn = abs(theta[j] - angle) % np.pi
+                    off = abs(-(x - cx) * np.sin(angle) + (y - cy) * np.cos(angle))
+                    if min(turn, np.pi - turn) > max_turn or off > across + 0.5:
+                        continue
+                    if abs(depth[y, x] - depth[v[i], u[i]]) > gate * (1 + max(abs(du), abs(dv))):
+                        continue
+                    segment[j] = count
+                    members[n] = j
+                    n += 1
+                    # running moments (Welford), so that the line follows its pixels
+                    ex, ey = x - cx, y - cy
+                    cx, cy = cx + ex / n, cy + ey / n
+                    sxx, sxy, syy = sxx + ex * (x - cx), sxy + ex * (y - cy), syy + ey * (y - cy)
+                    if n >= 6:
+                        angle = 0.5 * np.arctan2(2 * sxy, sxx - syy)
+        if n < MIN_PIXELS:
+            for k in range(n):
+                segment[members[k]] = -1
+        else:
+            count += 1
+    return segment
