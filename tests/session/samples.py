@@ -7,10 +7,11 @@ import numpy as np
 from handey_studio.base import Ledger
 from handey_studio.cell.workcell import Workcell
 from handey_studio.geometry.transforms import from_xyz_rpy, inverse
+from handey_studio.grasping import BumpRun, GraspPlane
 from handey_studio.motion import Certificate
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session import Session, new_session
-from handey_studio.task.plan import MoveCommand, MovePlan, MoveResult, Step
+from handey_studio.task.plan import GraspChoice, MoveCommand, MovePlan, MoveResult, Step
 from handey_studio.world import Library, PlacedPart, Robot, arm_of
 
 T_START = from_xyz_rpy((0.48, 0.02, 0.0), (0.0, 0.0, 0.3))
@@ -41,7 +42,26 @@ def hand_made_plan(robot: Robot, part: str = "l_block#1") -> MovePlan:
         line(robot, "retreat", there, robot.home, (0.1, 0.1)),
     )
     certificate = Certificate(0.004, (3, 0.5), ("finger_left", "depth map"), True, 0.001)
-    return MovePlan(part, T_START, goal, {"class": "faces 1 and 3", "T_part_hand": inverse(T_hand_part)}, steps, certificate)
+    return MovePlan(part, T_START, goal, hand_made_grasp(T_hand_part), steps, certificate, hand_made_approach())
+
+
+def hand_made_grasp(T_hand_part) -> GraspChoice:
+    """A grasp of the two long faces of a block."""
+    edge = np.array([[0.0, 0.03, 0.0], [0.03, 0.03, 0.0]])
+    contact = np.array([[0.0, 0.0, 0.02], [0.03, 0.0, 0.02], [0.03, 0.03, 0.02], [0.0, 0.03, 0.02]])
+    ranges = np.array([[1.2, 1.9]])
+    words = "faces 1–3 (40 mm)", (1, 3), "edge 0, centre, 20 mm deep"
+    return GraspChoice(*words, T_hand_part, np.eye(4), edge, contact, 1.57, ranges, (0.1, 0.2), 0.04, 0.06, 4e-4, 0.8)
+
+
+def hand_made_approach() -> BumpRun:
+    """The hand comes straight down between two heaps."""
+    n, cell = 220, 0.002
+    y = (np.arange(n) + 0.5) * cell - 0.22
+    filled = (np.arange(n)[None, :] < 110) | ((np.abs(y)[:, None] > 0.06) & (np.arange(n)[None, :] < 130))
+    plane = GraspPlane(T_START, np.array([-0.22, -0.22]), cell, filled, filled)
+    path = np.c_[np.linspace(0.02, 0.0, 30), np.linspace(0.15, 0.02, 30), np.full(30, -np.pi / 2)]
+    return BumpRun(plane, path, path[-1, :2], "reached", 0.0)
 
 
 def line(robot: Robot, kind, start, end, opening, T_hand_part=None, held=None) -> Step:
@@ -77,7 +97,7 @@ def full_session(folder) -> Session:
     """A session with a scan, located parts and a planned MOVE."""
     session = fresh_session(folder)
     plan = hand_made_plan(library(folder).robot("ur5"))
-    result = MoveResult(session.commands[0], "planned", "", plan, None, ledger(), {"sense": 1.25, "plan": 3.5})
+    result = MoveResult(session.commands[0], "planned", "", plan, ledger=ledger(), timing_s={"sense": 1.25, "plan": 3.5})
     brick = PlacedPart("brick#1", session.parts[1], from_xyz_rpy((0.42, -0.08, 0.0)))
     located = (PlacedPart("l_block#1", session.parts[0], T_START), brick)
     return replace(session, scan=hand_made_scan(), located=located, results=(result,))
