@@ -1,0 +1,192 @@
+"""Choosing a grasp that works at both ends (Handey 1987 §5): legal rotations, approach in the grasp plane, IK at pickup and putdown."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Ledger, Value, frozen_array
+from handey_studio.geometry.transforms import inverse
+from handey_studio.grasping import (
+    HAND_MARGIN_M,
+    BumpRun,
+    GraspEnd,
+    LegalRotations,
+    contact_area,
+    fill_grasp_plane,
+    hand_in_plane,
+    legal_rotations,
+    opening_around,
+    plan_approach,
+    tilt,
+)
+from handey_studio.task.options import Option
+from handey_studio.task.plan import GraspChoice
+from handey_studio.world import World, arm_of
+from handey_studio.world.collision import collision_model
+
+ANGLES_PER_GROUP = 2
+STANDOFFS_M = (0.08, 0.05)  # the approach starts with the fingertips this far in front of the grasp point
+MIN_JOINT_MARGIN_RAD = np.deg2rad(3.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp(Value):
+    """A grasp that can be approached: hand poses at both ends and the way in. `approach_hands` (k, 4, 4) ends at the pickup."""
+
+    option: Option
+    choice: GraspChoice
+    approach: BumpRun
+    approach_hands: NDArray
+    retreat_hands: NDArray
+    entry: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "approach_hands", frozen_array(self.approach_hands))
+        object.__setattr__(self, "retreat_hands", frozen_array(self.retreat_hands))
+
+    @property
+    def T_world_hand_pickup(self) -> NDArray:
+        return self.approach_hands[-1]
+
+    @property
+    def T_world_hand_putdown(self) -> NDArray:
+        return self.retreat_hands[0]
+
+
+def grasps_of(option: Option, entry: int, ledger: Ledger) -> list[Grasp]:
+    """The grasps of one option that are legal at both ends and can be approached, most vertical first."""
+    rotations = legal_rotations(option.group, option.pickup, option.putdown)
+    if not rotations.legal.any():
+        _fall_illegal(rotations, entry, ledger)
+        return []
+    found = []
+    for angle in rotations.best(ANGLES_PER_GROUP):
+        for side in (1, -1):
+            grasp = _approached(option, rotations, angle, side, entry, ledger)
+            if grasp is not None:
+                found.append(grasp)
+    if not found:
+        ledger.fall(entry, "no way in was found at any legal angle")
+    return found
+
+
+def _fall_illegal(rotations: LegalRotations, entry: int, ledger: Ledger) -> None:
+    """Say which end forbids the group: pickup, putdown, or each end some angles but never both the same."""
+    legal = rotations.legal_at
+    if not legal.any(axis=0).all():
+        end = 0 if not legal[:, 0].any() else 1
+        k = int(np.argmax(np.where(rotations.areas >= rotations.min_area, rotations.clearances[:, end], -np.inf)))
+        where = ("pickup", "putdown")[end]
+        ledger.fall(entry, f"the hand collides at every angle at the {where}", value=1e3 * float(rotations.clearances[k, end]),
+                    limit=1e3 * HAND_MARGIN_M, unit="mm", bodies=rotations.blockers[k][end])  # fmt: skip
+        return
+    k = int(np.argmax(rotations.clearances.min(axis=1)))
+    end = int(np.argmin(rotations.clearances[k]))
+    ledger.fall(entry, "no hand angle is legal at pickup and putdown together", value=1e3 * float(rotations.clearances[k, end]),
+                limit=1e3 * HAND_MARGIN_M, unit="mm", bodies=rotations.blockers[k][end])  # fmt: skip
+
+
+def _approached(option: Option, rotations: LegalRotations, angle: float, side: int, parent: int, ledger: Ledger) -> Grasp | None:
+    """The grasp at one angle, if the bump-line planner finds a way in that ends with enough contact."""
+    hand, group = option.goal.at_start.robot.hand, option.group
+    entry = ledger.add("approach", f"hand at {np.rad2deg(angle - group.angle):+.0f}°, side {side:+d}", parent=parent)
+    run = approach_run(option.pickup, option, angle)
+    if run.status != "reached":
+        reason = {"stuck": "the approach got stuck", "iterations": "the approach ran out of steps"}.get(
+            run.status, "the way in starts blocked"
+        )
+        ledger.fall(entry, reason, value=1e3 * run.distance, limit=0.0, unit="mm")
+        return None
+    final = run.path[-1]
+    area = contact_area(group.grasp_class, hand, final[:2], final[2])
+    if area < hand.min_contact_area:
+        ledger.fall(entry, "the fingers overlap the face too little after the approach", value=1e6 * area,
+                    limit=1e6 * hand.min_contact_area, unit="mm²")  # fmt: skip
+        return None
+    T_part_plane = group.grasp_class.T_part_plane
+    in_plane = np.array([hand_in_plane(pose[:2], pose[2], side) for pose in run.path])
+    back = _straight_back(final, side)
+    hands = option.T_world_start @ T_part_plane @ in_plane
+    retreat = option.goal.T_world_goal @ T_part_plane @ back
+    for where, world, T in (("pickup", option.goal.at_start, hands[-1]), ("putdown", option.goal.at_goal, retreat[0])):
+        clearance = collision_model(world).hand_contact(T, opening_around(hand, group.grasp_class.width))
+        if clearance.distance < HAND_MARGIN_M:
+            ledger.fall(entry, f"the hand, turned by the approach, collides at the {where}", value=1e3 * clearance.distance,
+                        limit=1e3 * HAND_MARGIN_M, unit="mm", bodies=clearance.bodies)  # fmt: skip
+            return None
+    choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), area)
+    return Grasp(option, choice, run, hands, retreat, entry)
+
+
+def approach_run(end: GraspEnd, option: Option, angle: float) -> BumpRun:
+    """The bump-line planner's run at one end, from as far out as the start is free."""
+    group, hand = option.group, end.world.robot.hand
+    T_world_plane = end.T_world_part @ group.grasp_class.T_part_plane
+    plane = fill_grasp_plane(end.world, T_world_plane, group.point, hand, opening_around(hand, group.grasp_class.width))
+    along = np.array([np.cos(angle), np.sin(angle)])
+    runs = []
+    for standoff in STANDOFFS_M:
+        start = np.append(group.point - (standoff + group.depth) * along, angle)
+        runs.append(plan_approach(plane, hand, start, group.point))
+        if runs[-1].status == "reached":
+            return runs[-1]
+    return min(runs, key=lambda run: run.distance)
+
+
+def _straight_back(final: NDArray, side: int) -> NDArray:
+    """T_plane_hand (k, 4, 4) of the retreat: straight back along the fingers."""
+    along = np.array([np.cos(final[2]), np.sin(final[2])])
+    return np.array([hand_in_plane(final[:2] - back * along, final[2], side) for back in np.linspace(0.0, STANDOFFS_M[0], 17)])
+
+
+def _choice(
+    option: Option, rotations: LegalRotations, final: NDArray, T_part_hand: NDArray, tilts: tuple[float, float], area: float
+) -> GraspChoice:
+    group, hand = option.group, option.goal.at_start.robot.hand
+    T_part_plane = group.grasp_class.T_part_plane
+    outline = np.array(group.grasp_class.contact.exterior.coords) if group.grasp_class.contact.geom_type == "Polygon" else np.empty((0, 2))
+    return GraspChoice(
+        name=group.grasp_class.name,
+        faces=group.grasp_class.faces,
+        group=group.name,
+        T_hand_part=inverse(T_part_hand),
+        T_part_plane=T_part_plane,
+        edge_part=_in_part(T_part_plane, group.edge),
+        contact_part=_in_part(T_part_plane, outline),
+        angle=float(final[2]),
+        ranges=np.array(rotations.ranges()).reshape(-1, 2),
+        tilts=tilts,
+        width=group.grasp_class.width,
+        opening=opening_around(hand, group.grasp_class.width),
+        contact_area=area,
+        joint_margin=0.0,
+    )
+
+
+def _in_part(T_part_plane: NDArray, points: NDArray) -> NDArray:
+    return points @ T_part_plane[:3, 1:3].T + T_part_plane[:3, 3]
+
+
+def reachable(world: World, T_world_hand: NDArray, opening: float, near: NDArray, where: str, entry: int, ledger: Ledger) -> list[NDArray]:
+    """Configurations (n,) that put the hand there within limits and clear of everything, nearest to `near` first."""
+    arm = arm_of(world.robot)
+    branches = arm.nearest_turns(arm.ik(T_world_hand), near)
+    if not len(branches):
+        distance = np.linalg.norm(T_world_hand[:3, 3] - world.robot.T_world_base[:3, 3])
+        ledger.add("reach", f"IK at the {where}", "out of the arm's reach", parent=entry, value=1e3 * distance, unit="mm")
+        return []
+    free = []
+    for k, q in enumerate(branches):
+        margin = float(world.robot.limit_margin(q))
+        if margin < MIN_JOINT_MARGIN_RAD:
+            ledger.add("reach", f"IK branch {k} at the {where}", "too close to a joint limit", parent=entry,
+                       value=np.rad2deg(margin), limit=np.rad2deg(MIN_JOINT_MARGIN_RAD), unit="°")  # fmt: skip
+            continue
+        contact = collision_model(world).in_contact(q, opening, margin=HAND_MARGIN_M)
+        if contact is not None:
+            ledger.add("reach", f"IK branch {k} at the {where}", "the arm collides", parent=entry, value=1e3 * contact.distance,
+                       limit=1e3 * HAND_MARGIN_M, unit="mm", bodies=contact.bodies)  # fmt: skip
+            continue
+        free.append(q)
+    return sorted(free, key=lambda q: float(np.abs(q - near).max()))

@@ -1,0 +1,228 @@
+"""From a grasp to a full plan: the arm's way there, the close, the lift, the transfer, the placement, the retreat and home."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Ledger, Progress, Value, frozen_array
+from handey_studio.motion import Certificate, PathResult, certify, plan_path, straight_path, time_path
+from handey_studio.task.grasp_search import Grasp, reachable
+from handey_studio.task.plan import MovePlan, Step, StepKind
+from handey_studio.world import FINGERS, Held, PlacedPart, World
+from handey_studio.world.support import neighbours
+
+Pairs = tuple[tuple[str, str], ...]
+
+LIFT_M = 0.06  # straight up from where it stood before the part is carried anywhere
+DESCENT_M = 0.06  # and straight down onto its destination
+STRAIGHT_STEP_M = 0.005
+FINGER_SPEED_M_S = 0.05
+MAX_PAIRS = 4  # IK branches at pickup × putdown that are tried for one grasp
+
+
+@dataclass(frozen=True, eq=False)
+class Start(Value):
+    """Where the arm is when the plan begins, and where it goes when it is done."""
+
+    q: NDArray
+    opening: float
+    q_home: NDArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", frozen_array(self.q))
+        object.__setattr__(self, "q_home", frozen_array(self.q_home))
+
+
+@dataclass(frozen=True, eq=False)
+class _End(Value):
+    """The straight motions at one end for one IK branch: in towards the part, and away from it."""
+
+    q: NDArray
+    towards: PathResult
+    away: PathResult
+
+
+def complete(grasp: Grasp, start: Start, ledger: Ledger, progress: Progress, rng: np.random.Generator) -> MovePlan | None:
+    """A plan with this grasp, or None, and the reasons in the ledger below the grasp's entry."""
+    goal, choice = grasp.option.goal, grasp.choice
+    pickups = reachable(goal.at_start, grasp.T_world_hand_pickup, choice.opening, start.q, "pickup", grasp.entry, ledger)
+    putdowns = reachable(goal.at_goal, grasp.T_world_hand_putdown, choice.opening, start.q, "putdown", grasp.entry, ledger)
+    if not pickups or not putdowns:
+        ledger.fall(grasp.entry, f"no arm configuration is free at the {'putdown' if pickups else 'pickup'}")
+        return None
+    ends = [_pickup_end(grasp, q, ledger) for q in pickups[:MAX_PAIRS]]
+    others = [_putdown_end(grasp, q, ledger) for q in putdowns[:MAX_PAIRS]]
+    pairs = [(a, b) for a in ends if a is not None for b in others if b is not None]
+    pairs.sort(key=lambda pair: float(np.abs(pair[0].away.q_rad[-1] - pair[1].towards.q_rad[0]).max()))
+    for pickup, putdown in pairs[:MAX_PAIRS]:
+        if progress.cancelled:
+            return None
+        plan = _carry(grasp, pickup, putdown, start, ledger, progress, rng)
+        if plan is not None:
+            return plan
+    ledger.fall(grasp.entry, "no pair of arm configurations is joined by free paths" if pairs else "no straight way in and out is free")
+    return None
+
+
+def held_part(grasp: Grasp) -> Held:
+    """The part in the hand after this grasp."""
+    return Held(grasp.option.goal.instance.name, grasp.option.goal.instance.part, grasp.choice.T_hand_part)
+
+
+def support_pairs(world: World, placed: PlacedPart) -> Pairs:
+    """The bodies that a standing part may touch while it is lifted from there or put down there."""
+    return tuple((placed.name, neighbour.name) for neighbour in neighbours(world.without(placed.name), placed))
+
+
+def finger_pairs(name: str) -> Pairs:
+    return tuple((finger, name) for finger in FINGERS)
+
+
+def _pickup_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
+    """Approach and lift with one IK branch."""
+    goal, choice = grasp.option.goal, grasp.choice
+    into = _straight(goal.at_start, q, grasp.approach_hands[::-1], choice.opening, None, (), "approach", grasp.entry, ledger)
+    if into is None:
+        return None
+    lifted = _raised(grasp.T_world_hand_pickup, LIFT_M)
+    allowed = _supports_at_start(grasp)
+    away = _straight(goal.carried, q, lifted, choice.width, held_part(grasp), allowed, "lift", grasp.entry, ledger)
+    return None if away is None else _End(q, _reversed(into), away)
+
+
+def _putdown_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
+    """Placement and retreat with one IK branch."""
+    goal, choice = grasp.option.goal, grasp.choice
+    raised = _raised(grasp.T_world_hand_putdown, DESCENT_M)
+    down = _straight(goal.carried, q, raised, choice.width, held_part(grasp), _supports_at_goal(grasp), "place", grasp.entry, ledger)
+    if down is None:
+        return None
+    away = _straight(goal.at_goal, q, grasp.retreat_hands, choice.opening, None, (), "retreat", grasp.entry, ledger)
+    return None if away is None else _End(q, _reversed(down), away)
+
+
+def _supports_at_start(grasp: Grasp) -> Pairs:
+    return support_pairs(grasp.option.goal.at_start, grasp.option.goal.instance)
+
+
+def _supports_at_goal(grasp: Grasp) -> Pairs:
+    goal = grasp.option.goal
+    return support_pairs(goal.at_goal, goal.at_goal.part(goal.instance.name))
+
+
+def _carry(
+    grasp: Grasp, pickup: _End, putdown: _End, start: Start, ledger: Ledger, progress: Progress, rng: np.random.Generator
+) -> MovePlan | None:
+    """The three free motions that join the straight ones, hardest first, and the steps of all."""
+    goal, choice = grasp.option.goal, grasp.choice
+    held = held_part(grasp)
+
+    def free(world: World, a: NDArray, b: NDArray, opening: float, carried: Held | None, what: str) -> PathResult | None:
+        progress.report(0.5, f"planning the arm's motion: {what}")
+        found = plan_path(world, a, b, opening, carried, rng=rng, progress=progress)
+        entry = ledger.add("arm motion", what, None if found.found else found.reason, parent=grasp.entry)
+        ledger.adopt(found.entries, parent=entry)
+        return found if found.found else None
+
+    lifted, raised = pickup.away.q_rad[-1], putdown.towards.q_rad[0]
+    transfer = free(goal.carried, lifted, raised, choice.width, held, "transfer")
+    there = transfer and free(goal.at_start, start.q, pickup.towards.q_rad[0], choice.opening, None, "to the pickup")
+    home = there and free(goal.at_goal, putdown.away.q_rad[-1], start.q_home, choice.opening, None, "home")
+    if transfer is None or there is None or home is None:
+        return None
+    steps, certificate = _steps(grasp, pickup, putdown, start, (there, transfer, home))
+    if not certificate.proved:
+        ledger.add("certificate", "the whole plan", certificate.reason or "not proved", parent=grasp.entry,
+                   value=1e3 * certificate.least_clearance, limit=1e3 * certificate.margin, unit="mm", bodies=certificate.bodies)  # fmt: skip
+        return None
+    margin = min(float(goal.at_start.robot.limit_margin(step.q_rad).min()) for step in steps)
+    return MovePlan(
+        part=goal.instance.name,
+        T_world_part_start=grasp.option.T_world_start,
+        T_world_part_goal=goal.T_world_goal,
+        grasp=replace(choice, joint_margin=margin),
+        steps=steps,
+        certificate=certificate,
+        approach=grasp.approach,
+        space=transfer.space,
+    )
+
+
+def _steps(
+    grasp: Grasp, pickup: _End, putdown: _End, start: Start, free: tuple[PathResult, PathResult, PathResult]
+) -> tuple[tuple[Step, ...], Certificate]:
+    """The nine steps of a MOVE without regrasp, and one certificate for all."""
+    goal, choice, held = grasp.option.goal, grasp.choice, held_part(grasp)
+    there, transfer, home = free
+    grip = finger_pairs(held.name)
+    lift_pairs, place_pairs = _supports_at_start(grasp), _supports_at_goal(grasp)
+    wide, tight = choice.opening, choice.width
+    rows: list[tuple[StepKind, World, NDArray, tuple[float, float], Held | None, Pairs]] = [
+        ("free", goal.at_start, start.q[None], (start.opening, wide), None, ()),
+        ("free", goal.at_start, there.q_rad, (wide, wide), None, ()),
+        ("approach", goal.at_start, pickup.towards.q_rad, (wide, wide), None, ()),
+        ("close", goal.at_start, pickup.q[None], (wide, tight), None, grip),
+        ("lift", goal.carried, pickup.away.q_rad, (tight, tight), held, grip + lift_pairs),
+        ("transfer", goal.carried, transfer.q_rad, (tight, tight), held, grip),
+        ("place", goal.carried, putdown.towards.q_rad, (tight, tight), held, grip + place_pairs),
+        ("open", goal.at_goal, putdown.q[None], (tight, wide), None, grip),
+        ("retreat", goal.at_goal, putdown.away.q_rad, (wide, wide), None, ()),
+        ("free", goal.at_goal, home.q_rad, (wide, wide), None, ()),
+    ]
+    paths = {1: there, 2: pickup.towards, 4: pickup.away, 5: transfer, 6: putdown.towards, 8: putdown.away, 9: home}
+    certificates = [
+        paths[k].certificate or _unproved() if k in paths else certify(world, np.repeat(q, 2, axis=0), np.array(openings), None, pairs)
+        for k, (_, world, q, openings, _, pairs) in enumerate(rows)
+    ]
+    return tuple(_step(goal.at_start, *row) for row in rows), worst(certificates)
+
+
+def _step(world: World, kind: StepKind, _: World, q: NDArray, openings: tuple[float, float], held: Held | None, pairs: Pairs) -> Step:
+    """One timed step; a single configuration means that only the fingers move."""
+    names = world.robot.joint_names
+    T_hand_part = held.T_hand_part if held else None
+    name = held.name if held else None
+    if len(q) == 1:
+        seconds = max(abs(openings[1] - openings[0]) / FINGER_SPEED_M_S, 0.1)
+        return Step(kind, names, np.array([0.0, seconds]), np.repeat(q, 2, axis=0), np.array(openings), name, T_hand_part, pairs)
+    timed = time_path(world.robot, q, np.full(len(q), openings[0]))
+    return Step(kind, names, timed.time_s, timed.q_rad, timed.hand_opening_m, name, T_hand_part, pairs)
+
+
+def worst(certificates: list[Certificate]) -> Certificate:
+    """One certificate for several stretches: the least clearance of all, `at` counting the stretch; proved when all are."""
+    k = min(range(len(certificates)), key=lambda k: (certificates[k].proved, certificates[k].least_clearance))
+    pairs = tuple(sorted({pair for certificate in certificates for pair in certificate.pairs_allowed}))
+    return replace(certificates[k], at=(k, certificates[k].at[1]), checks=sum(c.checks for c in certificates), pairs_allowed=pairs)
+
+
+def _unproved() -> Certificate:
+    return Certificate(-np.inf, (0, 0.0), (), False, 0.0, reason="a stretch has no certificate")
+
+
+def _straight(
+    world: World, q: NDArray, hands: NDArray, opening: float, held: Held | None, pairs: Pairs, what: str, parent: int, ledger: Ledger
+) -> PathResult | None:
+    found = straight_path(world, q, hands, opening, held, pairs)
+    if found.found:
+        return found
+    entry = ledger.add("straight motion", what, found.reason, parent=parent)
+    ledger.adopt(found.entries, parent=entry)
+    return None
+
+
+def _reversed(path: PathResult) -> PathResult:
+    """The same motion the other way round; its certificate holds for both directions."""
+    certificate = path.certificate
+    if certificate is not None:
+        segment, share = certificate.at
+        certificate = replace(certificate, at=(max(0, len(path.q_rad) - 2 - segment), 1.0 - share))
+    return replace(path, q_rad=path.q_rad[::-1], certificate=certificate, legs=())
+
+
+def _raised(T_world_hand: NDArray, height: float) -> NDArray:
+    """Hand poses (k, 4, 4) straight up from one."""
+    poses = np.repeat(T_world_hand[None], 1 + round(height / STRAIGHT_STEP_M), axis=0)
+    poses[:, 2, 3] += np.linspace(0.0, height, len(poses))
+    return poses

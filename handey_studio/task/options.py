@@ -1,0 +1,110 @@
+"""The options of a MOVE: which instance, which reading of the destination, which symmetric view of the part, which grasp group.
+
+Handey "simply lists all possible solutions, ranks them heuristically, and tries them sequentially" (§7). Here too, but every one that
+falls leaves its reason in the ledger.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Ledger, Value, frozen_array
+from handey_studio.geometry.transforms import inverse
+from handey_studio.grasping import GraspEnd, GraspGroup, angle_range, grasp_groups
+from handey_studio.world import PlacedPart, World
+from handey_studio.world.collision import ALLOWED_DEPTH_M
+from handey_studio.world.support import MAX_GAP_M, neighbours
+
+OFF_CENTRE_COST = 4.0  # [rad/m]: a grasp 10 cm off the centre of mass ranks like one tilted by 0.4 rad more
+
+
+@dataclass(frozen=True, eq=False)
+class Goal(Value):
+    """One instance to move and one place for it: `worlds` with the part at the start, in the hand, and at the goal."""
+
+    instance: PlacedPart
+    label: str
+    T_world_goal: NDArray
+    entry: int
+    at_start: World
+    carried: World
+    at_goal: World
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_goal", frozen_array(self.T_world_goal))
+
+
+@dataclass(frozen=True, eq=False)
+class Option(Value):
+    """A grasp group at both ends of a goal. `symmetry` counts the part's symmetries: the start pose is relabelled by it."""
+
+    goal: Goal
+    symmetry: int
+    group: GraspGroup
+    cost: float
+
+    @property
+    def T_world_start(self) -> NDArray:
+        """The part's start pose (4, 4) under this symmetry: it looks the same, and makes another motion to the goal."""
+        return self.goal.instance.T_world_part @ self.goal.instance.part.symmetries[self.symmetry]
+
+    @property
+    def pickup(self) -> GraspEnd:
+        return GraspEnd(self.goal.at_start, self.T_world_start)
+
+    @property
+    def putdown(self) -> GraspEnd:
+        return GraspEnd(self.goal.at_goal, self.goal.T_world_goal)
+
+    @property
+    def name(self) -> str:
+        turned = f", symmetry {self.symmetry}" if self.symmetry else ""
+        return f"{self.group.name}{turned}"
+
+
+def check_goal(world: World, instance: PlacedPart, label: str, T_world_goal: NDArray, ledger: Ledger) -> Goal | None:
+    """The goal, if the part can stand there: nothing in its way and something below it. Else None, and why in the ledger."""
+    entry = ledger.add("destination", f"{instance.name} to {label}")
+    carried = world.without(instance.name)
+    placed = PlacedPart(instance.name, instance.part, T_world_goal)
+    low, high = world.free_space
+    outside = np.maximum(low - placed.corners_world, placed.corners_world - high).max()
+    if outside > 0 and placed.corners_world[:, 2].min() > world.table_z - ALLOWED_DEPTH_M:
+        ledger.fall(entry, "the destination lies outside the free space", value=1e3 * outside, limit=0.0, unit="mm")
+        return None
+    near = neighbours(carried, placed, MAX_GAP_M)
+    for neighbour in near:
+        if neighbour.gap < -ALLOWED_DEPTH_M:
+            ledger.fall(entry, "the part would stand in something at the destination", value=-1e3 * neighbour.gap,
+                        limit=1e3 * ALLOWED_DEPTH_M, unit="mm", bodies=(instance.name, neighbour.name))  # fmt: skip
+            return None
+    if not any(neighbour.below for neighbour in near):
+        height = placed.corners_world[:, 2].min() - world.table_z
+        ledger.fall(entry, "nothing holds the part up at the destination", value=1e3 * height, limit=1e3 * MAX_GAP_M, unit="mm")
+        return None
+    return Goal(instance, label, T_world_goal, entry, world, carried, carried.with_part(placed))
+
+
+def list_options(goals: list[Goal], ledger: Ledger) -> list[Option]:
+    """Every option of the goals, best first: the most vertical fingers over both ends, then the nearest to the centre of mass."""
+    options = []
+    for goal in goals:
+        part, hand = goal.instance.part, goal.at_start.robot.hand
+        groups, entries = grasp_groups(part, hand)
+        ledger.adopt(entries, parent=goal.entry)
+        for symmetry in range(len(part.symmetries)):
+            T_start = goal.instance.T_world_part @ part.symmetries[symmetry]
+            for group in groups:
+                options.append(Option(goal, symmetry, group, _cost(group, part.solid.volume_and_centroid[1], T_start, goal.T_world_goal)))
+    return sorted(options, key=lambda option: option.cost)
+
+
+def _cost(group: GraspGroup, centroid: NDArray, T_world_start: NDArray, T_world_goal: NDArray) -> float:
+    """Least sum of the fingers' tilts [rad] at both ends over the group's angles, and a share for gripping off the centre of mass."""
+    T_part_plane = group.grasp_class.T_part_plane
+    angles = angle_range(group)
+    directions = np.stack([np.zeros_like(angles), np.cos(angles), np.sin(angles)], axis=1) @ T_part_plane[:3, :3].T
+    tilts = [np.arccos(np.clip(-directions @ T[2, :3], -1, 1)) for T in (T_world_start, T_world_goal)]
+    centre = (inverse(T_part_plane)[:3] @ np.append(centroid, 1.0))[1:]
+    return float((tilts[0] + tilts[1]).min() + OFF_CENTRE_COST * np.linalg.norm(group.point - centre))
