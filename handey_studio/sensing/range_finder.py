@@ -17,7 +17,8 @@ from handey_studio.sensing.depth_view import Pinhole
 
 AREA_M = 0.4
 SAME_SURFACE = 6.0  # readings of one cell within this many standard deviations of its highest are of one surface
-PINHOLE_NEIGHBOURS = 6  # a cell without a reading is a pinhole if so many of its eight neighbours agree
+PINHOLE_NEIGHBOURS = 6  # a cell without a reading is a pinhole if so many of its eight neighbours have one
+PINHOLE_SLOPE = 4.0  # and they differ by no more than this many cells in height: a steep face, not a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +134,7 @@ def fuse(finder: RangeFinder, points_range: NDArray) -> DepthMap:
         mean = np.bincount(number[top], weights=z[top], minlength=ny * nx) / count
     readings = max(1.0, float(np.median(count[count > 0]))) if kept.any() else 1.0
     return DepthMap(
-        elevation=_without_pinholes(mean.reshape(ny, nx), SAME_SURFACE * finder.reading_noise),
+        elevation=_without_pinholes(mean.reshape(ny, nx), PINHOLE_SLOPE * finder.cell),
         cell=finder.cell,
         T_world_range=finder.T_world_range,
         lights=finder.laser[None],
@@ -144,7 +145,7 @@ def fuse(finder: RangeFinder, points_range: NDArray) -> DepthMap:
 
 
 def _without_pinholes(elevation: NDArray, tolerance: float) -> NDArray:
-    """Empty cells whose neighbours lie on one surface, filled with their median."""
+    """Empty cells whose neighbours lie within `tolerance` [m] of each other, filled with their median."""
     padded = np.pad(elevation, 1, constant_values=np.nan)
     j, i = np.nonzero(np.isnan(elevation))
     shifts = [(dj, di) for dj in (0, 1, 2) for di in (0, 1, 2) if (dj, di) != (1, 1)]

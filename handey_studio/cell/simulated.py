@@ -1,0 +1,164 @@
+"""The simulated cell: a true state that the planner never sees, a range finder that scans it, an arm and a hand that act."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base.errors import unknown_name
+from handey_studio.cell.bodies import SolidBody, check_names, fixed_bodies, solid_body
+from handey_studio.cell.gripping import close_fingers
+from handey_studio.cell.guarded import first_touch, motion_at
+from handey_studio.cell.physics import settle
+from handey_studio.cell.protocol import CannotAct, Motion, Moved
+from handey_studio.cell.stripes import photograph
+from handey_studio.cell.workcell import Workcell
+from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.world.arm import arm_of
+from handey_studio.world.library import Library
+
+START_RAD = 0.01  # a motion must start this close to where the arm stands
+RELEASE_M = 1e-4  # fingers that open by more than this let go
+LIFTED_M = 0.01  # once the held body has moved this far, what leaned on it falls
+
+
+@dataclass(frozen=True)
+class _Held:
+    name: str
+    T_hand_body: NDArray
+    T_world_body_start: NDArray
+    left: bool = False
+
+
+class SimulatedCell:
+    """A cell with a hidden true state. Not a value: it lives in the process that executes.
+
+    The arm follows every motion exactly and passes through what is in its way: the plan's checker tells collisions, not the
+    cell. Gripping and guarded motions are geometric; bodies that are let go, or lose their support, fall by physics. While
+    it scans, the arm and what it holds are taken to be out of the range finder's view.
+    """
+
+    physics = False
+
+    def __init__(self, workcell: Workcell, library: Library) -> None:
+        self._workcell = workcell
+        self._robot = library.robot(workcell.robot)
+        self._arm = arm_of(self._robot)
+        self._bodies = true_bodies(workcell, library)
+        self._q = self._robot.home
+        self._opening = self._robot.hand.opening_max
+        self._held: _Held | None = None
+        self._pressing = False
+        self._scans = 0
+
+    def scan(self) -> DepthMap:
+        rng = np.random.default_rng([self._workcell.setup.seed, self._scans])
+        self._scans += 1
+        held = self._held.name if self._held else None
+        return photograph(self._workcell.finder, [body for body in self._bodies if body.name != held], rng)
+
+    def joints(self) -> NDArray:
+        return self._q
+
+    def opening(self) -> float:
+        return self._opening
+
+    def contact(self) -> bool:
+        return self._pressing
+
+    def follow(self, motion: Motion) -> Moved:
+        self._check(motion)
+        return self._arrive(motion.q_rad[-1], float(motion.time_s[-1]), float(motion.hand_opening_m[-1]))
+
+    def descend(self, motion: Motion) -> Moved:
+        self._check(motion)
+        held = None if self._held is None else (self._body(self._held.name), self._held.T_hand_body)
+        others = [body for body in self._bodies if held is None or body.name != held[0].name]
+        time = first_touch(self._arm, motion, others, held)
+        if time is None:
+            return self.follow(motion)
+        return self._arrive(motion_at(motion, time), time, float(np.interp(time, motion.time_s, motion.hand_opening_m)), contact=True)
+
+    def grip(self, opening: float) -> float:
+        hand = self._robot.hand
+        if not hand.opening_min <= opening <= hand.opening_max:
+            raise CannotAct(f"the hand opens from {hand.opening_min} to {hand.opening_max} m, so it cannot go to {opening:.4f} m.")
+        if self._held is not None:
+            return self._regrip(opening)
+        if opening < self._opening:
+            T_world_hand = self._arm.hand_pose(self._q)
+            grip = close_fingers(hand, T_world_hand, self._bodies, self._opening, opening)
+            self._opening, self._pressing = grip.opening, grip.opening > opening
+            if grip.held is not None and grip.T_hand_body is not None:
+                self._held = _Held(grip.held, grip.T_hand_body, self._body(grip.held).T_world_body)
+                self._pressing = True
+                self._carry()
+        else:
+            self._opening, self._pressing = float(opening), False
+        return self._opening
+
+    def true_pose(self, name: str) -> NDArray:
+        """T_world_body (4, 4) as it really is. Only benchmarks and checkers may ask; a planner that does is cheating."""
+        return self._body(name).T_world_body
+
+    def true_scene(self) -> tuple[SolidBody, ...]:
+        """All bodies where they really are. Only benchmarks and checkers may ask; a planner that does is cheating."""
+        return self._bodies
+
+    def held_truly(self) -> str | None:
+        """Name of the true body in the hand, for benchmarks and checkers only."""
+        return self._held.name if self._held else None
+
+    def _check(self, motion: Motion) -> None:
+        q, times = motion.q_rad, motion.time_s
+        if q.ndim != 2 or q.shape[1] != self._arm.n or not len(q) == len(times) == len(motion.hand_opening_m):
+            raise CannotAct(f"the motion has angles {q.shape} for {len(times)} times; this arm takes {self._arm.n} angles at each.")
+        if not (np.isfinite(q).all() and np.isfinite(motion.hand_opening_m).all() and (np.diff(times) >= 0).all()):
+            raise CannotAct("the motion holds a number that is not finite, or times that run backwards.")
+        off = float(np.abs(q[0] - self._q).max())
+        if off > START_RAD:
+            raise CannotAct(f"the motion starts {off:.3f} rad from where the arm stands; the limit is {START_RAD} rad.")
+        if self._robot.limit_margin(q).min() < -1e-9:
+            raise CannotAct("the motion leaves the joint limits.")
+
+    def _arrive(self, q: NDArray, time: float, opening: float, contact: bool = False) -> Moved:
+        self._q = np.array(q)
+        if self._held is None:
+            self._opening = opening
+        else:
+            self._carry()
+        return Moved(self._q, time, contact)
+
+    def _carry(self) -> None:
+        """Put the held body where the hand has it; once it has left its place, let the others settle."""
+        held = self._held
+        if held is None:
+            return
+        T_world_body = self._arm.hand_pose(self._q) @ held.T_hand_body
+        self._replace([self._body(held.name).at(T_world_body)])
+        if not held.left and np.linalg.norm(T_world_body[:3, 3] - held.T_world_body_start[:3, 3]) > LIFTED_M:
+            self._held = replace(held, left=True)
+            self._replace(settle([body for body in self._bodies if body.name != held.name]).bodies)
+
+    def _regrip(self, opening: float) -> float:
+        if opening > self._opening + RELEASE_M:
+            self._held, self._pressing, self._opening = None, False, float(opening)
+            self._replace(settle(self._bodies).bodies)
+        return self._opening
+
+    def _body(self, name: str) -> SolidBody:
+        for body in self._bodies:
+            if body.name == name:
+                return body
+        raise unknown_name("body", name, [body.name for body in self._bodies])
+
+    def _replace(self, moved) -> None:
+        new = {body.name: body for body in moved}
+        self._bodies = tuple(new.get(body.name, body) for body in self._bodies)
+
+
+def true_bodies(workcell: Workcell, library: Library) -> tuple[SolidBody, ...]:
+    """The true scene of a workcell: table, known blocks, and the setup's bodies, dropped when the setup says so."""
+    bodies = (*fixed_bodies(workcell), *(solid_body(body, library.part) for body in workcell.setup.bodies))
+    check_names(bodies)
+    return settle(bodies).bodies if workcell.setup.drop else bodies
