@@ -1,0 +1,31 @@
+"""§2: MOVE object TO destination — the options, their search, the plan, its execution."""
+
+from handey_studio.task.destination import format_pose, goal_poses, parse_destination
+from handey_studio.task.legs import Start
+from handey_studio.task.move import MoveOptions, check_command, describe, plan_move
+from handey_studio.task.plan import GraspChoice, MoveCommand, MovePlan, MoveResult, Step
+from handey_studio.task.run import Station, execute_in, plan_in, run_move, sense
+from handey_studio.task.sense import Scene, believed_world
+
+__all__ = [
+    "GraspChoice",
+    "MoveCommand",
+    "MoveOptions",
+    "MovePlan",
+    "MoveResult",
+    "Scene",
+    "Start",
+    "Station",
+    "Step",
+    "believed_world",
+    "check_command",
+    "describe",
+    "execute_in",
+    "format_pose",
+    "goal_poses",
+    "parse_destination",
+    "plan_in",
+    "plan_move",
+    "run_move",
+    "sense",
+]

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handey_studio.base import BadInput, Entry, Ledger, Progress, Silent
+from handey_studio.base import Entry, Ledger, Progress, Silent
 from handey_studio.base.errors import unknown_name
 from handey_studio.task.destination import base_name, goal_poses, parse_destination
 from handey_studio.task.grasp_search import grasps_of
 from handey_studio.task.legs import Start, complete
 from handey_studio.task.options import Goal, check_goal, list_options
-from handey_studio.task.plan import MoveCommand, MovePlan, MoveResult
+from handey_studio.task.plan import MoveCommand, MoveResult
 from handey_studio.world import Part, PlacedPart, World
 
 
@@ -141,9 +141,3 @@ def _timed(timing: dict[str, float], stage: str) -> Iterator[None]:
         yield
     finally:
         timing[stage] = timing.get(stage, 0.0) + time.perf_counter() - begun
-
-
-def need_known(name: str, known: dict[str, Part]) -> None:
-    """Raises BadInput when a workcell names no parts at all."""
-    if not known:
-        raise BadInput(f'"{name}" knows no parts; add at least one part to the session.')

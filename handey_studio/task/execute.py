@@ -1,0 +1,99 @@
+"""Carrying out a plan in a cell, step by step (Handey 1987 §2): grip, guarded placement, release."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Ledger, Progress, Silent, Value
+from handey_studio.cell.protocol import CannotAct, Cell, Motion, Moved
+from handey_studio.motion import straight_path, time_path
+from handey_studio.task.plan import MovePlan, Step
+from handey_studio.world import Held, PlacedPart, World, arm_of
+
+GRIP_TOLERANCE_M = 0.0025  # the fingers' width on a part may differ from the model's by this much
+EARLY_M = 0.004  # contact this far above the commanded pose is something else than the support
+SEARCH_M = 0.006  # and this far below it the guarded descent still looks for the support
+GUARDED_SPEED = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Performance(Value):
+    """How an execution ended: `done`, or the reason why not. `T_world_part_reached` (4, 4) by the arm's joints at release."""
+
+    done: bool
+    reason: str
+    T_world_part_reached: NDArray | None = None
+
+
+def execute(plan: MovePlan, carried: World, held: Held, cell: Cell, ledger: Ledger, progress: Progress = Silent()) -> Performance:
+    """Do every step. `carried` is the world without the part, in which the guarded descent is continued."""
+    reached = None
+    for count, step in enumerate(plan.steps):
+        if progress.cancelled:
+            return Performance(False, "cancelled", reached)
+        progress.report(count / len(plan.steps), f"step {count + 1} of {len(plan.steps)}: {step.kind}")
+        try:
+            problem, reached = _do(step, plan, carried, held, cell, reached)
+        except CannotAct as error:
+            problem = str(error)
+        entry = ledger.add("step", step.kind)
+        if problem:
+            ledger.fall(entry, problem)
+            return Performance(False, problem, reached)
+    return Performance(True, "", reached)
+
+
+def _do(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell, reached: NDArray | None) -> tuple[str, NDArray | None]:
+    """One step; (problem or "", the part's pose by the arm's joints once it was put down)."""
+    if step.kind == "close":
+        width = cell.grip(plan.grasp.width - GRIP_TOLERANCE_M)
+        off = abs(width - plan.grasp.width)
+        if not cell.contact() or off > GRIP_TOLERANCE_M:
+            what = "the fingers closed on nothing" if not cell.contact() else "the fingers hold something of another width"
+            return f"{what}: {1e3 * width:.1f} mm, expected {1e3 * plan.grasp.width:.1f} ± {1e3 * GRIP_TOLERANCE_M:.1f} mm", reached
+        return "", reached
+    if step.kind == "open":
+        reached = arm_of(carried.robot).hand_pose(cell.joints()) @ held.T_hand_part
+        cell.grip(float(step.hand_opening_m[-1]))
+        return "", reached
+    if step.kind == "place":
+        return _place(step, plan, carried, held, cell), reached
+    start = cell.joints()
+    path = _from_here(step, start)
+    cell.follow(path)
+    return "", reached
+
+
+def _from_here(step: Step, q: NDArray) -> Motion:
+    """The step's motion, led in from where the guarded descent left the arm: it may have stopped a little off."""
+    openings, times = step.hand_opening_m, step.time_s
+    if np.abs(step.q_rad[0] - q).max() < 1e-9:
+        return Motion(times, step.q_rad, openings)
+    return Motion(np.concatenate([[0.0], times + 0.2]), np.concatenate([q[None], step.q_rad]), np.concatenate([openings[:1], openings]))
+
+
+def _place(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell) -> str:
+    """Descend until contact; a problem in words if it came too early or not at all."""
+    moved = cell.descend(Motion(step.time_s / GUARDED_SPEED, step.q_rad, step.hand_opening_m))
+    height = _height_above_goal(moved, plan, carried, held)
+    if moved.contact:
+        return "" if height <= EARLY_M else f"contact {1e3 * height:.1f} mm above the destination, limit {1e3 * EARLY_M:.1f} mm"
+    T_world_hand = arm_of(carried.robot).hand_pose(moved.q_rad)
+    poses = np.repeat(T_world_hand[None], 7, axis=0)
+    poses[:, 2, 3] -= np.linspace(0.0, SEARCH_M, len(poses))
+    deeper = straight_path(carried, moved.q_rad, poses, plan.grasp.width, held, step.allowed_contacts)
+    if deeper.found:
+        timed = time_path(carried.robot, deeper.q_rad, np.full(len(deeper.q_rad), plan.grasp.width))
+        moved = cell.descend(Motion(timed.time_s / GUARDED_SPEED, timed.q_rad, timed.hand_opening_m))
+    return "" if moved.contact else f"no contact down to {1e3 * SEARCH_M:.1f} mm below the destination"
+
+
+def _height_above_goal(moved: Moved, plan: MovePlan, carried: World, held: Held) -> float:
+    T_world_part = arm_of(carried.robot).hand_pose(moved.q_rad) @ held.T_hand_part
+    return float(T_world_part[2, 3] - plan.T_world_part_goal[2, 3])
+
+
+def part_after(plan: MovePlan, held: Held, reached: NDArray) -> PlacedPart:
+    """The moved instance where it is believed to stand now."""
+    return PlacedPart(plan.part, held.part, reached)
