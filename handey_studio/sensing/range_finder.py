@@ -68,10 +68,10 @@ class RangeFinder(Value):
     area: tuple[float, float] = (AREA_M, AREA_M)
     cell: float = 0.001
     laser: NDArray = field(default_factory=lambda: np.array([AREA_M / 2, AREA_M / 2, 1.2]))
-    planes: int = 660
+    planes: int = 960
     sweep_rad: float = 0.22
     cameras: tuple[StripeCamera, ...] = field(default_factory=_default_cameras)
-    peak_noise_px: float = 0.2
+    peak_noise_px: float = 0.25
     max_height: float = 0.35
 
     def __post_init__(self) -> None:
