@@ -48,6 +48,7 @@ def edge_pixels(view: DepthView, surface: Surface) -> EdgePixels:
     near_jump = cv2.dilate(jump.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     kind = np.where(near_jump, NONE, crease)
     kind[jump] = JUMP
+    kind[np.isnan(view.depth)] = NONE  # an edge pixel is a point in space
     return EdgePixels(kind, np.where(jump[..., None], outward, 0.0))
 
 

@@ -1,0 +1,132 @@
+"""What the view offers to a verifier: readings, the nearest edge pixel of each direction, what is taken already."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from handey_studio.localization.edges import JUMP
+from handey_studio.localization.segments import Linked
+from handey_studio.localization.surface import Surface
+from handey_studio.sensing.depth_view import DepthView, Pinhole
+
+DIRECTIONS = 6  # sectors of edge directions in the image
+SECTOR = np.pi / DIRECTIONS
+
+
+class Limits(NamedTuple):
+    """Tolerances of verification [m]: a reading within `agree` of the face lies on it, one nearer than `hide` hides it, one
+    farther than `through` shows that nothing is there; an edge within `edge` sideways and `edge_depth` in depth is found."""
+
+    agree: float
+    hide: float
+    through: float
+    edge: float
+    edge_depth: float
+
+
+class Evidence(NamedTuple):
+    """Arrays that the compiled verifier reads.
+
+    `depth` (H, W) [m]; `taken` (H, W) bool, explained by a part already; `nearest` (DIRECTIONS, H, W) number of the nearest
+    edge pixel whose direction is about that of the sector, −1 for none; `edge_uv` (n, 2) [px], `edge_point` (n, 3) [m],
+    `edge_jump` (n,) bool. `camera`: 1 if parallel, scale x, scale y, cx, cy, as in `project`; `pixel` [m].
+    """
+
+    depth: NDArray
+    taken: NDArray
+    nearest: NDArray
+    edge_uv: NDArray
+    edge_point: NDArray
+    edge_jump: NDArray
+    camera: tuple[float, float, float, float, float]
+    pixel: float
+
+
+def limits_of(view: DepthView, slack: float = 1.0) -> Limits:
+    """Tolerances from the view's noise and outline error; `slack` > 1 for poses that were not refined yet."""
+    agree = slack * (3.0 * view.noise + view.outline_error)
+    return Limits(agree, 1.2 * agree, 1.5 * agree, slack * (1.5 * view.outline_error + view.noise), 2.0 * agree + view.outline_error)
+
+
+def evidence_of(view: DepthView, surface: Surface, linked: Linked) -> Evidence:
+    """The evidence of a view; only edge pixels that belong to a straight segment count."""
+    members = np.nonzero(linked.segment >= 0)[0]
+    u, v = linked.u[members], linked.v[members]
+    theta = _segment_directions(linked)[linked.segment[members]]
+    nearest = np.full((DIRECTIONS, *view.depth.shape), -1, dtype=np.int32)
+    for sector in range(DIRECTIONS):
+        off = np.abs((theta - sector * SECTOR + np.pi / 2) % np.pi - np.pi / 2)
+        chosen = np.nonzero(off <= SECTOR)[0]
+        if len(chosen):
+            nearest[sector] = _nearest(view.depth.shape, u[chosen], v[chosen], chosen)
+    p = view.projection
+    pinhole = isinstance(p, Pinhole)
+    camera = (0.0, p.fx, p.fy, p.cx, p.cy) if pinhole else (1.0, 1.0 / p.pixel, 1.0 / p.pixel, p.cx, p.cy)
+    uv = np.stack([u, v], axis=1).astype(float)
+    points = surface.points[v, u]
+    taken = np.zeros(view.depth.shape, dtype=bool)
+    return Evidence(np.array(view.depth), taken, nearest, uv, points, linked.kind[members] == JUMP, camera, surface.pixel)
+
+
+def _nearest(shape: tuple[int, ...], u: NDArray, v: NDArray, numbers: NDArray) -> NDArray:
+    """(H, W) int32: which of the pixels is nearest."""
+    empty = np.ones(shape, dtype=np.uint8)
+    empty[v, u] = 0
+    _, labels = cv2.distanceTransformWithLabels(empty, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL)
+    number_of = np.zeros(int(labels.max()) + 1, dtype=np.int32)
+    number_of[labels[v, u]] = numbers
+    return number_of[labels]
+
+
+def _segment_directions(linked: Linked) -> NDArray:
+    """Direction [rad] of each segment in the image, modulo π."""
+    member = linked.segment >= 0
+    segment, u, v = linked.segment[member], linked.u[member].astype(float), linked.v[member].astype(float)
+    n = np.maximum(np.bincount(segment), 1)
+    mean_u, mean_v = np.bincount(segment, u) / n, np.bincount(segment, v) / n
+    du, dv = u - mean_u[segment], v - mean_v[segment]
+    return 0.5 * np.arctan2(2 * np.bincount(segment, du * dv), np.bincount(segment, du * du) - np.bincount(segment, dv * dv))
+
+
+@njit(cache=True, inline="always")
+def project(x, y, z, camera):
+    """(u, v) [px] of a point in the sensor's frame."""
+    if camera[0] > 0.5:
+        return x * camera[1] + camera[3], y * camera[2] + camera[4]
+    return x / z * camera[1] + camera[3], y / z * camera[2] + camera[4]
+
+
+@njit(cache=True, inline="always")
+def pixels_per_metre(z, camera):
+    """How many pixels a metre across the view covers at depth z [m]."""
+    return camera[1] if camera[0] > 0.5 else camera[1] / z
+
+
+@njit(cache=True, inline="always")
+def ray_at(x, y, z, camera):
+    """Unit direction of the sensor's look at a point."""
+    if camera[0] > 0.5:
+        return 0.0, 0.0, 1.0
+    length = np.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
+
+
+@njit(cache=True)
+def nearest_edge(x, y, z, ax, ay, az, evidence):
+    """Number of the nearest edge pixel of about the direction that (ax, ay, az) has in the image at a point, −1 for none, and its
+    distance [m] sideways."""
+    u, v = project(x, y, z, evidence.camera)
+    step = 0.5 * evidence.pixel
+    u2, v2 = project(x + step * ax, y + step * ay, z + step * az, evidence.camera)
+    i, j = int(np.rint(u)), int(np.rint(v))
+    if i < 0 or j < 0 or i >= evidence.depth.shape[1] or j >= evidence.depth.shape[0]:
+        return -1, np.inf
+    sector = int(np.rint(np.arctan2(v2 - v, u2 - u) / SECTOR)) % DIRECTIONS
+    k = evidence.nearest[sector, j, i]
+    if k < 0:
+        return -1, np.inf
+    du, dv = evidence.edge_uv[k, 0] - u, evidence.edge_uv[k, 1] - v
+    return k, np.sqrt(du * du + dv * dv) / pixels_per_metre(z, evidence.camera)

@@ -1,0 +1,135 @@
+"""Hypothesize: transforms from assigning two model edges to two data edges (Handey 1987 §3)."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from handey_studio.localization.edges import CONVEX
+from handey_studio.localization.pairs import DataLines, ModelEdges, Pairs
+from handey_studio.sensing.depth_view import DepthView
+
+
+class MatchTolerances(NamedTuple):
+    """How far data may lie from the model: `angle` [rad] of α, `offset` [m] of d, `reach` [m] that a data edge may stick out of its
+    model edge, `flank` the cosine between a surface beside the data edge and the model's face there."""
+
+    angle: float
+    offset: float
+    reach: float
+    flank: float
+
+
+class Assignments(NamedTuple):
+    """Transforms `R` (n, 3, 3), `t` (n, 3) from the part's to the sensor's frame, the numbers of the data edges and model
+    edges that gave them (n, 2), how many assignments were looked at, and how many fell for each of Figure 3's parameters and the rest."""
+
+    R: NDArray
+    t: NDArray
+    data: NDArray
+    model: NDArray
+    tried: int
+    fell: NDArray
+
+
+FELL = ("angle α differs", "distance d differs", "longer than its model edge, or past its end (a1, a2)", "surface beside the edge faces another way")
+
+
+def tolerances(view: DepthView) -> MatchTolerances:
+    """From the view's noise and how far its silhouettes may lie off."""
+    reach = 2.0 * view.outline_error + 3.0 * view.noise
+    return MatchTolerances(np.deg2rad(10.0), 1.2 * view.outline_error + 3.0 * view.noise, reach, float(np.cos(np.deg2rad(25.0))))
+
+
+def hypothesize(edges: ModelEdges, table: Pairs, lines: DataLines, pairs: Pairs, limits: MatchTolerances, most: int) -> Assignments:
+    """At most four transforms for each consistent assignment of a data pair to a model pair; the first `most` of them."""
+    R, t, numbers, tried, fell = _match(edges, table, lines, pairs, limits, most)
+    return Assignments(R, t, numbers[:, :2], numbers[:, 2:], int(tried), fell)
+
+
+@njit(cache=True)
+def _frame(u, w, out):
+    """Columns: the bisector of two unit directions, the third axis, and their common normal."""
+    nx, ny, nz = u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    bx, by, bz = u[0] + w[0], u[1] + w[1], u[2] + w[2]
+    size = np.sqrt(bx * bx + by * by + bz * bz)
+    out[0, 0], out[1, 0], out[2, 0] = bx / size, by / size, bz / size
+    out[0, 2], out[1, 2], out[2, 2] = nx / length, ny / length, nz / length
+    out[0, 1] = out[1, 2] * out[2, 0] - out[2, 2] * out[1, 0]
+    out[1, 1] = out[2, 2] * out[0, 0] - out[0, 2] * out[2, 0]
+    out[2, 1] = out[0, 2] * out[1, 0] - out[1, 2] * out[0, 0]
+
+
+@njit(cache=True)
+def _flanks_agree(R, edges, m, lines, i, sign, limit):
+    """Whether the surfaces beside data edge i, taken in direction `sign`, are the faces beside model edge m.
+
+    A crease between the part and what it touches shows one face of the part, a jump shows one, a convex crease two.
+    """
+    agree = known = 0
+    for k in range(2):
+        side = lines.side[i, k] * sign
+        if side == 0.0:
+            continue
+        known += 1
+        normal = edges.left[m] if side > 0 else edges.right[m]
+        dot = 0.0
+        for r in range(3):
+            dot += lines.flank[i, k, r] * (R[r, 0] * normal[0] + R[r, 1] * normal[1] + R[r, 2] * normal[2])
+        agree += dot > limit
+    needed = 2 if (lines.kind[i] == CONVEX or edges.concave[m]) else 1
+    return known == 0 or agree >= min(needed, known)
+
+
+@njit(cache=True)
+def _match(edges, table, lines, pairs, limits, most):
+    R_out, t_out = np.empty((most, 3, 3)), np.empty((most, 3))
+    numbers = np.empty((most, 4), dtype=np.int64)
+    fell = np.zeros(4, dtype=np.int64)
+    frame_model, frame_data = np.empty((3, 3)), np.empty((3, 3))
+    n = tried = 0
+    for p in range(len(pairs.first)):
+        i, j = pairs.first[p], pairs.second[p]
+        for q in range(len(table.first)):
+            a, b = table.first[q], table.second[q]
+            tried += 1
+            if lines.half[i] > edges.half[a] + limits.reach / 2 or lines.half[j] > edges.half[b] + limits.reach / 2:
+                fell[2] += 1
+                continue
+            for code in range(4):
+                s, w = (1.0 if code & 1 else -1.0), (1.0 if code & 2 else -1.0)
+                alpha = pairs.alpha[p] if s * w > 0 else np.pi - pairs.alpha[p]
+                if abs(alpha - table.alpha[q]) > limits.angle:
+                    fell[0] += 1
+                    continue
+                if abs(s * w * pairs.d[p] - table.d[q]) > limits.offset:
+                    fell[1] += 1
+                    continue
+                off1 = abs(s * pairs.foot1[p] - table.foot1[q]) + lines.half[i] - edges.half[a]
+                off2 = abs(w * pairs.foot2[p] - table.foot2[q]) + lines.half[j] - edges.half[b]
+                if off1 > limits.reach or off2 > limits.reach:
+                    fell[2] += 1
+                    continue
+                _frame(edges.direction[a], edges.direction[b], frame_model)
+                _frame(s * lines.direction[i], w * lines.direction[j], frame_data)
+                R = frame_data @ frame_model.T
+                if not (_flanks_agree(R, edges, a, lines, i, s, limits.flank) and _flanks_agree(R, edges, b, lines, j, w, limits.flank)):
+                    fell[3] += 1
+                    continue
+                if n == most:
+                    return R_out, t_out, numbers, tried, fell
+                for r in range(3):
+                    model = data = 0.0
+                    for c in range(3):
+                        foot = edges.middle[a, c] + table.foot1[q] * edges.direction[a, c]
+                        foot += edges.middle[b, c] + table.foot2[q] * edges.direction[b, c]
+                        model += R[r, c] * foot / 2
+                        R_out[n, r, c] = R[r, c]
+                    data += lines.middle[i, r] + pairs.foot1[p] * lines.direction[i, r]
+                    data += lines.middle[j, r] + pairs.foot2[p] * lines.direction[j, r]
+                    t_out[n, r] = data / 2 - model
+                numbers[n, 0], numbers[n, 1], numbers[n, 2], numbers[n, 3] = i, j, a, b
+                n += 1
+    return R_out[:n], t_out[:n], numbers[:n], tried, fell

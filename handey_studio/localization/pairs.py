@@ -1,0 +1,118 @@
+"""Pairs of edges by their relative pose α, d, a₁, a₂ (Handey 1987 §3, Figure 3): the model's table, and the data's pairs."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.geometry.lines import RelativePose, relative_pose
+from handey_studio.localization.edges import CONCAVE, CONVEX, JUMP, KIND_NAMES
+from handey_studio.localization.segments import DataEdge
+from handey_studio.world.part import Part
+
+MIN_ALPHA = np.deg2rad(25.0)  # nearer to parallel, the foot of the common perpendicular is too uncertain
+SHARP = np.deg2rad(15.0)  # model edges blunter than this make no crease that could be found
+SAME_M = 1e-5
+
+
+class ModelEdges(NamedTuple):
+    """The part's edges as arrays, in its frame: `middle`, unit `direction` (n, 3), `half` length (n,) [m], outward
+    normals of the faces to the `left` and `right` (n, 3), and whether the edge is `concave` (n,)."""
+
+    middle: NDArray
+    direction: NDArray
+    half: NDArray
+    left: NDArray
+    right: NDArray
+    concave: NDArray
+
+
+class DataLines(NamedTuple):
+    """The data edges as arrays, in the sensor's frame: `middle`, unit `direction` (n, 3), `half` length (n,) [m], `kind`
+    (n,), up to two flanks each: normals `flank` (n, 2, 3) and `side` (n, 2), +1 if that surface is left of the direction, −1 right, 0 none."""
+
+    middle: NDArray
+    direction: NDArray
+    half: NDArray
+    kind: NDArray
+    flank: NDArray
+    side: NDArray
+
+
+class Pairs(NamedTuple):
+    """Pairs of edges `first`, `second` (n,) and their relative pose (n,); feet count from the edges' middles, so that
+    a₁ and a₂, the distances to the nearest ends, are |half − |foot||."""
+
+    first: NDArray
+    second: NDArray
+    alpha: NDArray
+    d: NDArray
+    foot1: NDArray
+    foot2: NDArray
+
+
+@lru_cache(maxsize=64)
+def model_edges(part: Part) -> ModelEdges:
+    """The edges of a part that can be seen as edges."""
+    solid = part.solid
+    kept = [edge for edge in solid.edges if abs(edge.dihedral) > SHARP]
+    start, end = (solid.vertices[[getattr(edge, key) for edge in kept]] for key in ("start", "end"))
+    lengths = np.linalg.norm(end - start, axis=1)
+    left, right = (solid.normals[[getattr(edge, key) for edge in kept]] for key in ("left", "right"))
+    concave = np.array([edge.dihedral < 0 for edge in kept])
+    return ModelEdges((start + end) / 2, (end - start) / lengths[:, None], lengths / 2, left, right, concave)
+
+
+@lru_cache(maxsize=64)
+def model_pairs(part: Part) -> Pairs:
+    """The part's ordered pairs of edges that are not parallel, one of each that its symmetries map onto one another."""
+    edges = model_edges(part)
+    first, second = (index.reshape(-1) for index in np.indices((len(edges.half),) * 2))
+    pairs = _pairs(edges.middle, edges.direction, first, second)
+    images = [_image(edges, T) for T in part.symmetries]
+    number = pairs.first * len(edges.half) + pairs.second
+    lowest = np.min([image[pairs.first] * len(edges.half) + image[pairs.second] for image in images], axis=0)
+    keep = lowest == number
+    return Pairs(*(array[keep] for array in pairs))
+
+
+def data_lines(edges: tuple[DataEdge, ...]) -> DataLines:
+    """Data edges as arrays."""
+    n = len(edges)
+    kind = np.array([KIND_NAMES.index(edge.kind) for edge in edges], dtype=np.int64)
+    ends = np.array([edge.ends_sensor for edge in edges]).reshape(n, 2, 3)
+    direction = np.array([edge.direction for edge in edges]).reshape(n, 3)
+    flank, side = np.zeros((n, 2, 3)), np.zeros((n, 2))
+    for i, edge in enumerate(edges):
+        for k, (normal, inward) in enumerate(zip(edge.normals_sensor, edge.inward_sensor, strict=True)):
+            flank[i, k] = normal
+            side[i, k] = 1.0 if inward @ np.cross(normal, direction[i]) > 0 else -1.0
+    half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2
+    return DataLines(ends.mean(axis=1), direction, half, kind, flank, side)
+
+
+def data_pairs(lines: DataLines) -> Pairs:
+    """Every pair of data edges that are not parallel, long ones first."""
+    first, second = np.triu_indices(len(lines.half), 1)
+    order = np.argsort(-np.minimum(lines.half[first], lines.half[second]), kind="stable")
+    return _pairs(lines.middle, lines.direction, first[order], second[order])
+
+
+def _pairs(middle: NDArray, direction: NDArray, first: NDArray, second: NDArray) -> Pairs:
+    relative: RelativePose = relative_pose(middle[first], direction[first], middle[second], direction[second])
+    skew = (relative.alpha > MIN_ALPHA) & (relative.alpha < np.pi - MIN_ALPHA)
+    return Pairs(first[skew], second[skew], relative.alpha[skew], relative.d[skew], relative.foot1[skew], relative.foot2[skew])
+
+
+def _image(edges: ModelEdges, T: NDArray) -> NDArray:
+    """Where a symmetry takes each edge (n,)."""
+    moved = edges.middle @ T[:3, :3].T + T[:3, 3]
+    turned = edges.direction @ T[:3, :3].T
+    distance = np.linalg.norm(moved[:, None] - edges.middle[None], axis=2)
+    across = 1.0 - np.abs(turned @ edges.direction.T)
+    return np.argmin(distance + across, axis=1)
+
+
+__all__ = ["CONCAVE", "CONVEX", "JUMP", "DataLines", "ModelEdges", "Pairs", "data_lines", "data_pairs", "model_edges", "model_pairs"]

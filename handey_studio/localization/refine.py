@@ -1,0 +1,156 @@
+"""Refine: faces to readings, point to plane, and outlines to edge pixels, by robust Gauss–Newton steps.
+
+From straight above a flat-lying part shows only its top, so nothing but the outline fixes it sideways. A sensor loses a
+margin at each silhouette: half a pixel by its grid alone, several millimetres with depth cameras. That margin is one
+more unknown of the fit, so that it does not push the part when only one of two opposite sides is seen.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from handey_studio.localization.evidence import Evidence, Limits, ray_at
+from handey_studio.localization.samples import PartSamples
+from handey_studio.localization.verify import GRAZING, ON, _dot, edge_state, facing, reading_at
+from handey_studio.sensing.depth_view import DepthView
+
+TAPERING = 0.5  # limits shrink to this share over the iterations
+
+
+class Weights(NamedTuple):
+    """Standard deviations [m] of a reading off its face and an edge pixel off its outline; the margin's expected value and spread [m]."""
+
+    face: float
+    edge: float
+    margin: float
+    margin_spread: float
+
+
+def weights_of(view: DepthView, pixel: float) -> Weights:
+    """From the view's noise and outline error and the size of a pixel [m]."""
+    return Weights(2.0 * view.noise, view.noise + 0.5 * view.outline_error, 0.5 * pixel + 0.2 * view.outline_error, 0.5 * view.outline_error)
+
+
+def refine(
+    R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, weights: Weights, iterations: int
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Poses R (n, 3, 3), t (n, 3) moved to where the view agrees best; their lost margins (n,) [m] and the rms (n,) [m] off faces."""
+    return _refine(np.array(R), np.array(t), samples, evidence, limits, weights, iterations)
+
+
+@njit(cache=True)
+def _add(A, g, row, residual, sigma):
+    """One observation, weighted down the farther it is off (Cauchy), into the normal equations."""
+    scaled = residual / sigma
+    weight = 1.0 / (1.0 + scaled * scaled / 4.0) / (sigma * sigma)
+    for r in range(7):
+        g[r] += weight * row[r] * residual
+        for c in range(r + 1):
+            A[r, c] += weight * row[r] * row[c]
+
+
+@njit(cache=True)
+def _row(row, mx, my, mz, px, py, pz):
+    """Derivative of m · (turn × p + shift) by the turn and the shift."""
+    row[0], row[1], row[2] = py * mz - pz * my, pz * mx - px * mz, px * my - py * mx
+    row[3], row[4], row[5] = mx, my, mz
+    row[6] = 0.0
+
+
+@njit(cache=True)
+def _faces(R, t, samples, evidence, limits, sigma, A, g):
+    """Readings to the planes of the faces that they lie on; (sum of squares, count)."""
+    row = np.zeros(7)
+    squares, count = 0.0, 0
+    for k in range(len(samples.face_weight)):
+        p, normal = samples.face_point[k], samples.face_normal[k]
+        px, py, pz = _dot(R, 0, p), _dot(R, 1, p), _dot(R, 2, p)
+        x, y, z = px + t[0], py + t[1], pz + t[2]
+        cosine = facing(R, normal, x, y, z, evidence.camera)
+        if cosine < GRAZING:
+            continue
+        seen, behind, j, i = reading_at(x, y, z, evidence, limits)
+        if seen != ON or evidence.taken[j, i]:
+            continue
+        rx, ry, rz = ray_at(x, y, z, evidence.camera)
+        residual = -behind / rz * cosine  # of the reading from the face, along its outward normal
+        _row(row, _dot(R, 0, normal), _dot(R, 1, normal), _dot(R, 2, normal), px, py, pz)
+        _add(A, g, row, residual, sigma)
+        squares += residual * residual
+        count += 1
+    return squares, count
+
+
+@njit(cache=True)
+def _outlines(R, t, margin, samples, evidence, limits, sigma, A, g):
+    """Edge pixels to the visible edges, across both the edge and the line of sight; silhouettes less the margin."""
+    row = np.zeros(7)
+    for k in range(len(samples.edge)):
+        state, e = edge_state(R, t, k, samples, evidence, limits)
+        if state != 1:
+            continue
+        p, a = samples.edge_point[k], samples.along[k]
+        px, py, pz = _dot(R, 0, p), _dot(R, 1, p), _dot(R, 2, p)
+        x, y, z = px + t[0], py + t[1], pz + t[2]
+        rx, ry, rz = ray_at(x, y, z, evidence.camera)
+        ax, ay, az = _dot(R, 0, a), _dot(R, 1, a), _dot(R, 2, a)
+        mx, my, mz = ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
+        length = np.sqrt(mx * mx + my * my + mz * mz)
+        if length < 0.2:
+            continue
+        left = facing(R, samples.left[k], x, y, z, evidence.camera) > 0
+        right = facing(R, samples.right[k], x, y, z, evidence.camera) > 0
+        into = samples.into_left[k] if left else samples.into_right[k]
+        outwards = -(mx * _dot(R, 0, into) + my * _dot(R, 1, into) + mz * _dot(R, 2, into))
+        sign = (1.0 if outwards > 0 else -1.0) / length
+        mx, my, mz = sign * mx, sign * my, sign * mz
+        q = evidence.edge_point[e]
+        depth = z / q[2] if evidence.camera[0] < 0.5 else 1.0  # along the pixel's ray to the outline's depth
+        residual = mx * (q[0] * depth - x) + my * (q[1] * depth - y)
+        _row(row, mx, my, mz, px, py, pz)
+        if (left != right) and evidence.edge_jump[e]:
+            residual += margin
+            row[6] = -1.0
+        _add(A, g, row, residual, sigma)
+
+
+@njit(cache=True)
+def _turned(R, w):
+    """R after a small turn by the rotation vector w, exactly orthonormal (Rodrigues)."""
+    angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    K = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+    a = np.sin(angle) / angle if angle > 1e-9 else 1.0
+    b = (1.0 - np.cos(angle)) / (angle * angle) if angle > 1e-9 else 0.5
+    return (np.eye(3) + a * K + b * (K @ K)) @ R
+
+
+@njit(cache=True)
+def _refine(R, t, samples, evidence, limits, weights, iterations):
+    margins, rms = np.full(len(t), weights.margin), np.zeros(len(t))
+    for n in range(len(t)):
+        for step in range(iterations):
+            share = 1.0 - (1.0 - TAPERING) * step / max(iterations - 1, 1)
+            tight = Limits(limits.agree, limits.hide, limits.through * share, limits.edge * share, limits.edge_depth)
+            A, g = np.zeros((7, 7)), np.zeros(7)
+            squares, count = _faces(R[n], t[n], samples, evidence, tight, weights.face, A, g)
+            _outlines(R[n], t[n], margins[n], samples, evidence, tight, weights.edge, A, g)
+            strength = 40.0 / weights.margin_spread**2  # as good as a few dozen edge pixels
+            A[6, 6] += strength
+            g[6] += strength * (weights.margin - margins[n])
+            rms[n] = np.sqrt(squares / count) if count else np.inf
+            if count < 6:
+                break
+            for r in range(7):
+                for c in range(r):
+                    A[c, r] = A[r, c]
+                A[r, r] += 1e-6 * A[r, r] + 1e-3
+            delta = np.linalg.solve(A, g)
+            size = np.sqrt(delta[0] ** 2 + delta[1] ** 2 + delta[2] ** 2)
+            if size > 0.2:
+                delta *= 0.2 / size
+            R[n] = _turned(R[n], delta[:3])
+            t[n] += delta[3:6]
+            margins[n] = max(margins[n] + delta[6], 0.0)
+    return R, t, margins, rms

@@ -1,0 +1,94 @@
+"""What localization says: the poses, the edges it saw, the hypotheses it weighed and why each fell."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Entry, Value, frozen_array, rejected_counts
+from handey_studio.localization.segments import DataEdge
+
+
+@dataclass(frozen=True)
+class LocateOptions:
+    """`max_poses` instances of a part are looked for. A pose is accepted with at least `min_score`, at least
+    `min_edge_share` of its visible edges found, at least `min_surface_share` of what is not hidden on the readings, and at least
+    `min_visible_fraction` of the faces turned to the sensor seen. Data edges shorter than `min_edge_m` [m] are left out
+    (None: by the part's size). `max_hypotheses` are verified and the best `max_refined` refined. `table_z_m` is the
+    height [m] below which no part can be (None: no such plane)."""
+
+    max_poses: int = 5
+    min_score: float = 0.5
+    min_edge_share: float = 0.55
+    min_surface_share: float = 0.85
+    min_visible_fraction: float = 0.12
+    min_edge_m: float | None = None
+    max_data_edges: int = 120
+    max_hypotheses: int = 40000
+    max_refined: int = 60
+    table_z_m: float | None = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class LocatedPose(Value):
+    """A part found. Transforms (4, 4); `score` in [0, 1] is the share of its visible edges found times the share of its
+    surface that agrees with the readings; `visible_fraction` of the faces turned to the sensor is seen; `surface_rms_m` [m] how far
+    readings lie off them; `margin_m` [m] what the sensor lost at silhouettes."""
+
+    part: str
+    T_world_part: NDArray
+    T_sensor_part: NDArray
+    score: float
+    edges_predicted: int
+    edges_found: int
+    visible_fraction: float
+    surface_rms_m: float
+    margin_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_part", frozen_array(self.T_world_part))
+        object.__setattr__(self, "T_sensor_part", frozen_array(self.T_sensor_part))
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis(Value):
+    """A pose that was weighed: from data edges `data` (their numbers), with what was found [m of edge]; `reason` says why it fell,
+    None if it was accepted."""
+
+    part: str
+    T_world_part: NDArray
+    score: float
+    found_m: float
+    missing_m: float
+    data: tuple[int, ...]
+    reason: str | None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_part", frozen_array(self.T_world_part))
+
+
+@dataclass(frozen=True, eq=False)
+class LocateResult(Value):
+    """`poses` best first; `edges` found in the view; up to 50 `hypotheses` for the screen; `fell` counts assignments of edge
+    pairs by the parameter that they failed; `timing_s` seconds a stage. Nothing found: `poses` is empty and `reason` says why."""
+
+    poses: tuple[LocatedPose, ...]
+    edges: tuple[DataEdge, ...]
+    hypotheses: tuple[Hypothesis, ...]
+    ledger: tuple[Entry, ...]
+    timing_s: dict[str, float] = field(default_factory=dict)
+    fell: dict[str, int] = field(default_factory=dict)
+    reason: str = ""
+    cancelled: bool = False
+
+    @property
+    def rejected(self) -> dict[str, int]:
+        """How many assignments and hypotheses fell for each reason."""
+        return {**self.fell, **rejected_counts(self.ledger)}
+
+
+def pose_matrix(R: NDArray, t: NDArray) -> NDArray:
+    """T (4, 4) from a rotation (3, 3) and a translation (3,)."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, t
+    return T

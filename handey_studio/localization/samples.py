@@ -1,0 +1,81 @@
+"""What a part would show: points on its edges and faces, taken once per part."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.localization.pairs import model_edges
+from handey_studio.world.part import Part
+
+EDGE_SAMPLES = 320
+FACE_SAMPLES = 900
+MIN_PER_EDGE = 4
+MIN_PER_FACE = 12
+
+
+class PartSamples(NamedTuple):
+    """Points on a part, in its frame [m].
+
+    Edges: `edge_point` (n, 3), its number `edge` (n,) in the table of model edges, unit `along`, normals `left`, `right`
+    (n, 3), directions `into_left`, `into_right` (n, 3) from the edge into its faces, and `edge_weight` (n,) [m], the
+    length it stands for. Faces: `face_point`, `face_normal` (m, 3) and `face_weight` (m,) [m²].
+    """
+
+    edge_point: NDArray
+    edge: NDArray
+    along: NDArray
+    left: NDArray
+    right: NDArray
+    into_left: NDArray
+    into_right: NDArray
+    edge_weight: NDArray
+    face_point: NDArray
+    face_normal: NDArray
+    face_weight: NDArray
+
+
+@lru_cache(maxsize=64)
+def part_samples(part: Part) -> PartSamples:
+    """Points spread evenly over a part's edges and faces."""
+    edges = model_edges(part)
+    spacing = 2.0 * edges.half.sum() / EDGE_SAMPLES
+    counts = np.maximum(np.rint(2.0 * edges.half / spacing).astype(int), MIN_PER_EDGE)
+    number = np.repeat(np.arange(len(counts)), counts)
+    place = np.concatenate([(np.arange(n) + 0.5) / n * 2.0 - 1.0 for n in counts])
+    along, left, right = edges.direction[number], edges.left[number], edges.right[number]
+    points = edges.middle[number] + (place * edges.half[number])[:, None] * along
+    weight = (2.0 * edges.half / counts)[number]
+    face_point, face_normal, face_weight = _face_samples(part)
+    return PartSamples(
+        points, number, along, left, right, np.cross(left, along), -np.cross(right, along), weight, face_point, face_normal, face_weight
+    )
+
+
+def _face_samples(part: Part) -> tuple[NDArray, NDArray, NDArray]:
+    """Points on the faces from a low-discrepancy sequence over each triangle, with the area that each stands for."""
+    solid = part.solid
+    points, normals, weights = [], [], []
+    total = sum(_area(solid.vertices[t]) for f in range(len(solid.faces)) for t in solid.face_triangles(f))
+    for f in range(len(solid.faces)):
+        triangles = solid.vertices[solid.face_triangles(f)]
+        areas = np.array([_area(t) for t in triangles])
+        for corners, area in zip(triangles, areas, strict=True):
+            n = max(round(FACE_SAMPLES * area / total), int(np.ceil(MIN_PER_FACE * area / areas.sum())))
+            points.append(_spread(corners, n))
+            normals.append(np.repeat(solid.normals[f][None], n, axis=0))
+            weights.append(np.full(n, area / n))
+    return np.concatenate(points), np.concatenate(normals), np.concatenate(weights)
+
+
+def _area(corners: NDArray) -> float:
+    return float(np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0])) / 2)
+
+
+def _spread(corners: NDArray, n: int) -> NDArray:
+    """n points (n, 3) spread over a triangle: the golden-ratio sequence, folded into the triangle."""
+    a, b = np.modf(0.5 + np.arange(1, n + 1)[:, None] * (0.7548776662466927, 0.5698402909980532))[0].T
+    fold = a + b > 1
+    a, b = np.where(fold, 1 - a, a), np.where(fold, 1 - b, b)
+    return corners[0] + a[:, None] * (corners[1] - corners[0]) + b[:, None] * (corners[2] - corners[0])

@@ -1,0 +1,149 @@
+"""Verify: does the view show what the part would show if it stood there (Handey 1987 §3)?
+
+The paper counts the predicted edges that are present. Counting those that are visible and missing as well is what
+tells a small box from its outline laid inside a bigger face. Edges behind a nearer surface say nothing.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from handey_studio.localization.evidence import Evidence, Limits, nearest_edge, project, ray_at
+from handey_studio.localization.samples import PartSamples
+
+ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
+GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on
+MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the edge to count as found
+
+
+class Verdict(NamedTuple):
+    """What speaks for and against poses (n,): `found` and `missing` [m] of visible edge, `on`, `through` and `hidden`
+    [m²] of the faces that look at the sensor, `taken` [m²] of those lying on readings that another part explains."""
+
+    found: NDArray
+    missing: NDArray
+    on: NDArray
+    through: NDArray
+    hidden: NDArray
+    unknown: NDArray
+    taken: NDArray
+
+    @property
+    def edge_share(self) -> NDArray:
+        """Share of the visible edges that was found."""
+        return self.found / np.maximum(self.found + self.missing, 1e-9)
+
+    @property
+    def surface_share(self) -> NDArray:
+        """Share of the faces that are not hidden where the readings agree."""
+        return self.on / np.maximum(self.on + self.through, 1e-12)
+
+    @property
+    def visible_fraction(self) -> NDArray:
+        """Share of the faces looking at the sensor that is seen."""
+        return self.on / np.maximum(self.on + self.through + self.hidden + self.unknown, 1e-12)
+
+    @property
+    def support(self) -> NDArray:
+        """Rank [m]: found less missing edge, less what is seen through, as a length."""
+        return self.found - self.missing - 2.0 * np.sqrt(self.through) - 2.0 * np.sqrt(self.taken)
+
+
+def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, every: int = 1) -> Verdict:
+    """Verdicts on the poses R (n, 3, 3), t (n, 3) of the part in the sensor's frame, from every `every`-th sample."""
+    counts = _verify(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits, every) * every
+    return Verdict(*counts.T)
+
+
+def edge_tally(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits) -> tuple[int, int]:
+    """How many of the part's edges are predicted to be seen at one pose, and how many of them are found."""
+    states = _edge_states(R, t, samples, evidence, limits)
+    edges = int(samples.edge.max()) + 1
+    visible = np.bincount(samples.edge, states >= 0, edges)
+    found = np.bincount(samples.edge, states == 1, edges)
+    total = np.bincount(samples.edge, minlength=edges)
+    predicted = (visible >= 2) & (visible >= 0.2 * total)
+    return int(predicted.sum()), int((predicted & (found >= MIN_EDGE_SHARE * visible)).sum())
+
+
+@njit(cache=True)
+def reading_at(x, y, z, evidence, limits):
+    """How the reading at a point's pixel stands to it (ON, HIDDEN, THROUGH, UNKNOWN), how far behind it [m], and its pixel."""
+    u, v = project(x, y, z, evidence.camera)
+    i, j = int(np.rint(u)), int(np.rint(v))
+    if z <= 0.0 or i < 0 or j < 0 or i >= evidence.depth.shape[1] or j >= evidence.depth.shape[0]:
+        return UNKNOWN, 0.0, 0, 0
+    behind = evidence.depth[j, i] - z
+    if np.isnan(behind):
+        return UNKNOWN, 0.0, j, i
+    if behind < -limits.hide:
+        return HIDDEN, behind, j, i
+    return (THROUGH if behind > limits.through else ON), behind, j, i
+
+
+@njit(cache=True)
+def _dot(R, r, w):
+    return R[r, 0] * w[0] + R[r, 1] * w[1] + R[r, 2] * w[2]
+
+
+@njit(cache=True)
+def facing(R, normal, x, y, z, camera):
+    """Cosine between a face's outward normal and the way back to the sensor, at a point of it."""
+    rx, ry, rz = ray_at(x, y, z, camera)
+    return -(_dot(R, 0, normal) * rx + _dot(R, 1, normal) * ry + _dot(R, 2, normal) * rz)
+
+
+@njit(cache=True)
+def edge_state(R, t, k, samples, evidence, limits):
+    """One edge sample at a pose: 1 found, 0 visible but missing, −1 not to be seen. Then the nearest edge pixel, or −1."""
+    p = samples.edge_point[k]
+    x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
+    inset = limits.edge + evidence.pixel
+    state = -1
+    for flank in range(2):
+        normal = samples.left[k] if flank == 0 else samples.right[k]
+        if facing(R, normal, x, y, z, evidence.camera) < GRAZING:
+            continue
+        into = samples.into_left[k] if flank == 0 else samples.into_right[k]
+        qx, qy, qz = x + inset * _dot(R, 0, into), y + inset * _dot(R, 1, into), z + inset * _dot(R, 2, into)
+        seen = reading_at(qx, qy, qz, evidence, limits)[0]
+        if seen == ON or seen == THROUGH:
+            state = 0
+    if state < 0:
+        return -1, -1
+    a = samples.along[k]
+    edge, sideways = nearest_edge(x, y, z, _dot(R, 0, a), _dot(R, 1, a), _dot(R, 2, a), evidence)
+    if edge < 0 or sideways > limits.edge + 0.7 * evidence.pixel or abs(evidence.edge_point[edge, 2] - z) > limits.edge_depth:
+        return 0, -1
+    return 1, edge
+
+
+@njit(cache=True)
+def _edge_states(R, t, samples, evidence, limits):
+    states = np.empty(len(samples.edge), dtype=np.int64)
+    for k in range(len(states)):
+        states[k] = edge_state(R, t, k, samples, evidence, limits)[0]
+    return states
+
+
+@njit(cache=True)
+def _verify(R, t, samples, evidence, limits, every):
+    out = np.zeros((len(t), 7))
+    for n in range(len(t)):
+        for k in range(n % every, len(samples.edge), every):
+            state, _ = edge_state(R[n], t[n], k, samples, evidence, limits)
+            if state >= 0:
+                out[n, 1 - state] += samples.edge_weight[k]
+        for k in range(n % every, len(samples.face_weight), every):
+            p = samples.face_point[k]
+            x, y, z = _dot(R[n], 0, p) + t[n, 0], _dot(R[n], 1, p) + t[n, 1], _dot(R[n], 2, p) + t[n, 2]
+            if facing(R[n], samples.face_normal[k], x, y, z, evidence.camera) < GRAZING:
+                continue
+            seen, _, j, i = reading_at(x, y, z, evidence, limits)
+            weight = samples.face_weight[k]
+            out[n, 2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += weight
+            if seen == ON and evidence.taken[j, i]:
+                out[n, 6] += weight
+    return out
