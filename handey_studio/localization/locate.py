@@ -180,7 +180,7 @@ def _accept(search: _Search, candidates: list[_Candidate]) -> tuple[list[Located
                 shown.append((float(verdict.support[0]), _hypothesis(search, candidate, verdict, reason)))
     search.timing["accept"] = time.perf_counter() - start
     shown.sort(key=lambda pair: (pair[1].reason is not None, -pair[0]))
-    return sorted(accepted, key=lambda pose: -pose.score), [hypothesis for _, hypothesis in shown]
+    return accepted, [hypothesis for _, hypothesis in shown]
 
 
 def _judge(search: _Search, candidate: _Candidate) -> Verdict:
