@@ -4,7 +4,6 @@ import gzip
 import io
 import os
 import re
-import tempfile
 import zlib
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import msgspec
 
 from handey_studio.base import BadInput
 from handey_studio.base.errors import unknown_name
+from handey_studio.base.files import replace_file
 from handey_studio.session.checks import check_name, check_session
 from handey_studio.session.coding import from_plain, to_plain
 from handey_studio.session.session import Session
@@ -72,7 +72,7 @@ def write_session(path: str | os.PathLike, session: Session) -> None:
     data = session_to_bytes(session)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _replace_file(path, data)
+        replace_file(path, data)
     except OSError as error:
         raise BadInput(f'session "{path}" cannot be written: {error.strerror}.') from None
 
@@ -124,24 +124,3 @@ def _decoded(content: bytes) -> Any:
         return msgspec.json.decode(content)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise BadInput(f"it is not valid JSON: {str(error).rstrip('.')}.") from None
-
-
-def _replace_file(path: Path, data: bytes) -> None:
-    """Temporary file beside it, flushed to the disk, then renamed over it, then the folder flushed."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    if hasattr(os, "O_DIRECTORY"):
-        folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)

@@ -1,0 +1,228 @@
+"""The same functions from the shell. `handey COMMAND --help` tells each command's options."""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from handey_studio.base import BadInput, Entry
+from handey_studio.base.files import replace_file
+from handey_studio.cell.simulated import SimulatedCell
+from handey_studio.localization import LocateOptions, localize
+from handey_studio.localization.report import locate_report
+from handey_studio.sensing.files import read_depth
+from handey_studio.sensing.support import support_plane
+from handey_studio.session import Session, find_session, read_session, write_session
+from handey_studio.task import MoveCommand, MoveOptions, MoveResult, Station, describe, run_move
+from handey_studio.task.bench import bench_piles
+from handey_studio.task.report import move_report
+from handey_studio.world import Library
+
+DONE, FAILED, BAD_INPUT, NOTHING_FOUND = 0, 1, 2, 3
+
+
+class _Parser(argparse.ArgumentParser):
+    """Bad arguments in one sentence, without the usage lines."""
+
+    def error(self, message: str) -> NoReturn:
+        raise BadInput(f"{self.prog}: {message}; see {self.prog} --help.")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; the exit status: 0 done, 1 a MOVE failed, 2 bad input, 3 nothing found."""
+    try:
+        given = _parser().parse_args(arguments)
+        return given.run(given)
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("stopped.", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="handey", description="Locate parts in a pile, choose grasps, plan and place, and understand every decision.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+
+    def command(name: str, run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        added = commands.add_parser(name, help=text, description=text)
+        added.set_defaults(run=run)
+        added.add_argument("--library", type=Path, help="folder with your own robots/, parts/ and sessions/")
+        return added
+
+    studio = command("studio", _studio, "open the workbench in the browser")
+    studio.add_argument("session", nargs="?", default="figure1", help="a session file, or its name in a library (default: figure1)")
+    studio.add_argument("--host", default="127.0.0.1", help="address to listen on (default: 127.0.0.1, this machine only)")
+    studio.add_argument("--port", type=_port, default=8080, help="port to listen on (default: 8080)")
+    _locate_arguments(command("locate", _locate, "find known parts in a depth image"))
+    for name, run, text in (
+        ("move", _move, "run a session's MOVEs: sense, plan, execute"),
+        ("plan", _plan, "the same, but stop before executing"),
+    ):
+        _move_arguments(command(name, run, text))
+    bench = command("bench", _bench, "measure on many random scenes")
+    bench.add_argument("what", choices=("piles",), help="piles: one MOVE in each of many random piles")
+    bench.add_argument("--seeds", type=_seeds, default=range(20), help="FIRST:END of the seeds (default: 0:20)")
+    bench.add_argument("--json", type=Path, help="write the table here")
+    return parser
+
+
+def _locate_arguments(locate: argparse.ArgumentParser) -> None:
+    locate.add_argument("--depth", required=True, type=Path, help="16-bit PNG, or organised .npy cloud [m]")
+    locate.add_argument("--camera", type=Path, help="camera JSON with fx fy cx cy depth_scale (a cloud can do without)")
+    locate.add_argument("--part", required=True, action="append", help="a part by name, or a mesh file; may be given again")
+    locate.add_argument("--part-scale", type=float, default=1.0, help="scales mesh files on reading: 0.001 for millimetres")
+    locate.add_argument("--max-poses", type=_positive, default=5, help="at most this many of each part (default: 5)")
+    locate.add_argument("--seed", type=int, default=0)
+    locate.add_argument("--json", required=True, type=Path, help="where the poses go")
+
+
+def _move_arguments(move: argparse.ArgumentParser) -> None:
+    move.add_argument("session", help="a session file, or its name in a library")
+    move.add_argument("--part", help="move this part instead of running the session's own commands")
+    move.add_argument("--to", metavar="DESTINATION", help="x,y,z[,roll,pitch,yaw] (metres, degrees) or on:PART[:POSE]")
+    move.add_argument("--seed", type=int, help="instead of the session's own seed")
+    move.add_argument("--json", type=Path, help="where the steps, the certificate and the ledger go")
+    move.add_argument("--save", type=Path, metavar="SESSION2", help="where the session with its results goes")
+
+
+def _studio(given: argparse.Namespace) -> int:
+    from handey_studio.app import run  # the workbench's libraries are loaded only when it is opened
+
+    library = Library.choose(given.library)
+    run(find_session(library, given.session), host=given.host, port=given.port, library=library)
+    return DONE
+
+
+def _locate(given: argparse.Namespace) -> int:
+    library = Library.choose(given.library)
+    parts = [library.part(name, given.part_scale) for name in given.part]
+    begun = time.perf_counter()
+    reading = read_depth(given.depth, given.camera)
+    timing, view, options = {"read": time.perf_counter() - begun}, reading.view, LocateOptions(max_poses=given.max_poses)
+    rng = np.random.default_rng(given.seed)
+    if not reading.knows_world:
+        begun = time.perf_counter()
+        support = support_plane(view, rng)
+        view = replace(view, T_world_sensor=support.T_world_sensor)
+        options = options if support.found else replace(options, table_z_m=None)
+        timing["support"] = time.perf_counter() - begun
+    result = localize(view, parts, options, rng)
+    _write_json(given.json, locate_report(result, view.T_world_sensor, timing))
+    if not result.poses:
+        print(f"none of {', '.join(part.name for part in parts)} was found: {result.reason}", file=sys.stderr)
+        return NOTHING_FOUND
+    for pose in result.poses:
+        x, y, z = pose.T_world_part[:3, 3]
+        print(f"{pose.part} at {x:.4f}, {y:.4f}, {z:.4f} m, score {pose.score:.2f}, {pose.edges_found} of {pose.edges_predicted} edges found")
+    return DONE
+
+
+def _move(given: argparse.Namespace) -> int:
+    return _run_moves(given, execute=True)
+
+
+def _plan(given: argparse.Namespace) -> int:
+    return _run_moves(given, execute=False)
+
+
+def _run_moves(given: argparse.Namespace, execute: bool) -> int:
+    library = Library.choose(given.library)
+    session = read_session(find_session(library, given.session))
+    commands = _commands(given, session)
+    seed = session.seed if given.seed is None else given.seed
+    robot = library.robot(session.workcell.robot)
+    station = Station(session.workcell, robot, session.parts)
+    cell = SimulatedCell(session.workcell, library)
+    results, scene = [], None
+    for command in commands:
+        scene, result = run_move(station, cell, command, MoveOptions(seed=seed), execute, _Lines())
+        results.append(result)
+        _tell(result)
+        if result.status == "failed":
+            break
+    if given.json:
+        _write_json(given.json, move_report(results, robot))
+    if given.save:
+        write_session(given.save, replace(session, commands=commands, seed=seed, scene=scene, results=tuple(results)))
+    return DONE if len(results) == len(commands) and all(result.status != "failed" for result in results) else FAILED
+
+
+def _commands(given: argparse.Namespace, session: Session) -> tuple[MoveCommand, ...]:
+    if (given.part is None) != (given.to is None):
+        raise BadInput("--part and --to go together: MOVE part TO destination.")
+    if given.part is not None:
+        return (MoveCommand(given.part, given.to),)
+    if not session.commands:
+        raise BadInput(f'session "{session.name}" has no commands; give --part and --to.')
+    return session.commands
+
+
+def _tell(result: MoveResult) -> None:
+    stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in result.timing_s.items())
+    print(f"MOVE {result.command.part} TO {result.command.to}: {result.status}{': ' + result.reason if result.reason else ''}")
+    print(f"  {stages}")
+    if result.plan is not None:
+        certificate = result.plan.certificate
+        clearance = f"{1e3 * certificate.least_clearance:.1f} mm ({' and '.join(certificate.bodies)})"
+        print(f"  grasp: {result.plan.grasp.group}; least clearance {clearance}")
+    elif result.ledger:
+        print(f"  {len(result.ledger)} options in the ledger; the last: {_last_reason(result.ledger)}")
+
+
+def _last_reason(entries: tuple[Entry, ...]) -> str:
+    return next((f"{entry.stage} {entry.option}: {describe(entry)}" for entry in reversed(entries) if entry.reason), "none fell")
+
+
+class _Lines:
+    """Progress as lines on standard error when a person watches."""
+
+    cancelled = False
+
+    def report(self, fraction: float, message: str) -> None:
+        if sys.stderr.isatty():
+            print(f"\r\033[K{100 * fraction:3.0f} % {message[:90]}", end="", file=sys.stderr, flush=True)
+
+
+def _bench(given: argparse.Namespace) -> int:
+    report = bench_piles(given.seeds, Library.choose(given.library), tell=print)
+    if given.json:
+        _write_json(given.json, report)
+    return DONE
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    try:
+        replace_file(path, (json.dumps(content, allow_nan=False) + "\n").encode())
+    except OSError as error:
+        raise BadInput(f'"{path}" cannot be written: {error.strerror}.') from None
+
+
+def _port(text: str) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a port from 1 to 65535')
+    return int(text)
+
+
+def _positive(text: str) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= 1000:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 1 to 1000')
+    return int(text)
+
+
+def _seeds(text: str) -> range:
+    first, colon, end = text.partition(":")
+    if not (first.isdigit() and (end.isdigit() or not colon)):
+        raise argparse.ArgumentTypeError(f'"{text}" is not FIRST:END')
+    return range(int(first), int(end) if colon else int(first) + 1)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,87 @@
+"""Results as the JSON that other programs read (schema `handey/move/1`)."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from handey_studio.base import rejected_counts
+from handey_studio.motion import Certificate
+from handey_studio.task.plan import GraspChoice, MoveResult, Step
+from handey_studio.world import Robot
+
+
+def move_report(results: list[MoveResult], robot: Robot) -> dict[str, Any]:
+    """All MOVEs of one run."""
+    return {"schema": "handey/move/1", "robot": robot.name, "moves": [_move(result) for result in results]}
+
+
+def _move(result: MoveResult) -> dict[str, Any]:
+    plan = result.plan
+    stages = {"destination", "grasp group", "grasp class", "approach group", "approach", "reach", "arm motion"}
+    options = [entry for entry in result.ledger if entry.stage in stages]
+    return {
+        "part": plan.part if plan else result.command.part,
+        "destination": result.command.to,
+        "status": result.status,
+        "reason": result.reason,
+        "T_world_part_start": plain(result.T_world_part_start),
+        "T_world_part_goal": plain(result.T_world_part_goal),
+        "T_world_part_reached": plain(result.T_world_part_reached),
+        "grasp": _grasp(plan.grasp) if plan else None,
+        "regrasps": plan.regrasps if plan else 0,
+        "steps": [_step(step) for step in plan.steps] if plan else [],
+        "certificate": certificate_report(plan.certificate) if plan else None,
+        "options": {"tried": len(options), "rejected": rejected_counts(options)},
+        "ledger": [asdict(entry) for entry in result.ledger],
+        "physics": result.physics,
+        "timing_s": result.timing_s,
+    }
+
+
+def _grasp(grasp: GraspChoice) -> dict[str, Any]:
+    return {
+        "class": grasp.name,
+        "faces": list(grasp.faces),
+        "group": grasp.group,
+        "T_hand_part": plain(grasp.T_hand_part),
+        "angle_rad": grasp.angle,
+        "legal_ranges_rad": plain(grasp.ranges),
+        "tilts_rad": list(grasp.tilts),
+        "width_m": grasp.width,
+        "opening_m": grasp.opening,
+        "contact_area_m2": grasp.contact_area,
+        "joint_margin_rad": grasp.joint_margin,
+    }
+
+
+def _step(step: Step) -> dict[str, Any]:
+    return {
+        "kind": step.kind,
+        "joint_names": list(step.joint_names),
+        "time_s": plain(step.time_s),
+        "q_rad": plain(step.q_rad),
+        "hand_opening_m": plain(step.hand_opening_m),
+        "held": step.held,
+        "T_hand_part": plain(step.T_hand_part),
+        "allowed_contacts": [list(pair) for pair in step.allowed_contacts],
+    }
+
+
+def certificate_report(certificate: Certificate) -> dict[str, Any]:
+    """What was proved: the least clearance [m], where, between which bodies, and the margin that every pair keeps."""
+    return {
+        "proved": certificate.proved,
+        "least_clearance_m": certificate.least_clearance if np.isfinite(certificate.least_clearance) else None,
+        "bodies": list(certificate.bodies),
+        "at_stretch": certificate.at[0],
+        "at_share": certificate.at[1],
+        "margin_m": certificate.margin,
+        "exact_checks": certificate.checks,
+        "reason": certificate.reason,
+    }
+
+
+def plain(values: np.ndarray | None) -> Any:
+    """An array as nested lists; None stays None."""
+    return None if values is None else np.asarray(values).tolist()
