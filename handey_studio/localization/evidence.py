@@ -18,13 +18,15 @@ SECTOR = np.pi / DIRECTIONS
 
 class Limits(NamedTuple):
     """Tolerances of verification [m]: a reading within `agree` of the face lies on it, one nearer than `hide` hides it, one
-    farther than `through` shows that nothing is there; an edge within `edge` sideways and `edge_depth` in depth is found."""
+    farther than `through` shows that nothing is there; an edge within `edge` sideways and `edge_depth` in depth is found, at a
+    silhouette no more than `outside` beyond it."""
 
     agree: float
     hide: float
     through: float
     edge: float
     edge_depth: float
+    outside: float
 
 
 class Evidence(NamedTuple):
@@ -48,7 +50,9 @@ class Evidence(NamedTuple):
 def limits_of(view: DepthView, slack: float = 1.0) -> Limits:
     """Tolerances from the view's noise and outline error; `slack` > 1 for poses that were not refined yet."""
     agree = slack * (3.0 * view.noise + view.outline_error)
-    return Limits(agree, 1.2 * agree, 1.5 * agree, slack * (1.5 * view.outline_error + view.noise), 2.0 * agree + view.outline_error)
+    edge = slack * (1.5 * view.outline_error + view.noise)
+    outside = edge if slack > 1.0 else 0.4 * view.outline_error + view.noise
+    return Limits(agree, 1.2 * agree, 1.5 * agree, edge, 2.0 * agree + view.outline_error, outside)
 
 
 def evidence_of(view: DepthView, surface: Surface, linked: Linked) -> Evidence:

@@ -132,7 +132,7 @@ def _refine(R, t, samples, evidence, limits, weights, iterations):
     for n in range(len(t)):
         for step in range(iterations):
             share = 1.0 - (1.0 - TAPERING) * step / max(iterations - 1, 1)
-            tight = Limits(limits.agree, limits.hide, limits.through * share, limits.edge * share, limits.edge_depth)
+            tight = Limits(limits.agree, limits.hide, limits.through * share, limits.edge * share, limits.edge_depth, limits.edge)
             A, g = np.zeros((7, 7)), np.zeros(7)
             squares, count = _faces(R[n], t[n], samples, evidence, tight, weights.face, A, g)
             _outlines(R[n], t[n], margins[n], samples, evidence, tight, weights.edge, A, g)

@@ -101,14 +101,16 @@ def edge_state(R, t, k, samples, evidence, limits):
     p = samples.edge_point[k]
     x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
     inset = limits.edge + evidence.pixel
-    state = -1
+    state, flanks = -1, 0
+    ix = iy = iz = 0.0
     for flank in range(2):
         normal = samples.left[k] if flank == 0 else samples.right[k]
         if facing(R, normal, x, y, z, evidence.camera) < GRAZING:
             continue
         into = samples.into_left[k] if flank == 0 else samples.into_right[k]
-        qx, qy, qz = x + inset * _dot(R, 0, into), y + inset * _dot(R, 1, into), z + inset * _dot(R, 2, into)
-        seen = reading_at(qx, qy, qz, evidence, limits)[0]
+        ix, iy, iz = _dot(R, 0, into), _dot(R, 1, into), _dot(R, 2, into)
+        flanks += 1
+        seen = reading_at(x + inset * ix, y + inset * iy, z + inset * iz, evidence, limits)[0]
         if seen == ON or seen == THROUGH:
             state = 0
     if state < 0:
@@ -117,6 +119,13 @@ def edge_state(R, t, k, samples, evidence, limits):
     edge, sideways = nearest_edge(x, y, z, _dot(R, 0, a), _dot(R, 1, a), _dot(R, 2, a), evidence)
     if edge < 0 or sideways > limits.edge + 0.7 * evidence.pixel or abs(evidence.edge_point[edge, 2] - z) > limits.edge_depth:
         return 0, -1
+    if flanks == 1:  # a silhouette: sensors lose readings there, they do not add any
+        u, v = project(x, y, z, evidence.camera)
+        u2, v2 = project(x + inset * ix, y + inset * iy, z + inset * iz, evidence.camera)
+        du, dv = u2 - u, v2 - v
+        inside = (evidence.edge_uv[edge, 0] - u) * du + (evidence.edge_uv[edge, 1] - v) * dv
+        if inside * inset / (du * du + dv * dv + 1e-12) < -limits.outside - 0.7 * evidence.pixel:
+            return 0, -1
     return 1, edge
 
 
