@@ -1,0 +1,82 @@
+"""The house stays as it is laid out: imports run one way, only the workbench imports viser, files and functions stay short."""
+
+import ast
+from pathlib import Path
+
+import handey_studio
+
+ROOT = Path(handey_studio.__file__).parent
+FLOORS = (
+    {"base"},
+    {"geometry"},
+    {"world"},
+    {"sensing"},
+    {"localization", "motion"},
+    {"grasping"},
+    {"cell"},
+    {"task"},
+    {"session"},
+    {"app", "cli"},
+)
+FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+
+
+def _modules():
+    for path in sorted(ROOT.rglob("*.py")):
+        yield path, ast.parse(path.read_text())
+
+
+def _imports(tree: ast.Module):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+
+
+def _room(path: Path) -> str:
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def test_imports_run_one_way():
+    wrong = []
+    for path, tree in _modules():
+        room = _room(path)
+        for module in _imports(tree):
+            words = module.split(".")
+            if room == "__init__" or words[0] != "handey_studio" or len(words) < 2 or words[1] == room:
+                continue
+            if room == "cli" and words[1] == "app":
+                continue  # the command that opens the workbench
+            if FLOOR[words[1]] >= FLOOR[room]:
+                wrong.append(f"{path.relative_to(ROOT)} imports {module}")
+    assert not wrong, wrong
+
+
+def test_every_room_has_a_floor():
+    rooms = {_room(path) for path, _ in _modules()} - {"__init__"}
+    assert rooms <= set(FLOOR), rooms - set(FLOOR)
+
+
+def test_only_the_workbench_imports_viser():
+    users = {_room(path) for path, tree in _modules() for module in _imports(tree) if module.split(".")[0] == "viser"}
+    assert users == {"app"}
+
+
+def test_no_planner_imports_the_simulated_truth():
+    hidden = {"handey_studio.cell.simulated", "handey_studio.cell.piles", "handey_studio.cell.bodies", "handey_studio.cell.stripes"}
+    planners = {"localization", "motion", "grasping", "sensing", "world"}
+    assert not [path for path, tree in _modules() if _room(path) in planners and hidden & set(_imports(tree))]
+    for path, tree in _modules():
+        if _room(path) == "task" and path.name != "bench.py":
+            assert not hidden & set(_imports(tree)), path
+
+
+def test_functions_stay_short():
+    long = [
+        f"{path.relative_to(ROOT)}:{node.lineno} {node.name} has {node.end_lineno - node.lineno + 1} lines"
+        for path, tree in _modules()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.end_lineno - node.lineno + 1 > 70
+    ]
+    assert not long, long
