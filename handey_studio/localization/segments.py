@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.localization.edges import CONCAVE, CONVEX, JUMP, KIND_NAMES, EdgePixels
@@ -13,6 +14,7 @@ from handey_studio.sensing.depth_view import DepthView
 
 MIN_PIXELS = 10
 MAX_TURN = np.deg2rad(30.0)  # a pixel's own direction against the segment's: pixel directions are rough
+MAX_BENDS = 4  # rounds of cutting a segment in two
 TRIM = 2.5  # sigmas; two rounds of trimming take the corners' rounding off a segment
 
 
@@ -79,8 +81,29 @@ def data_edges(view: DepthView, surface: Surface, edges: EdgePixels, linked: Lin
     order = np.argsort(linked.segment, kind="stable")
     order = order[linked.segment[order] >= 0]
     cuts = np.nonzero(np.diff(linked.segment[order]))[0] + 1
-    found = [_fit(view, surface, edges, linked, members) for members in np.split(order, cuts) if len(members)]
+    straight = [piece for members in np.split(order, cuts) if len(members) for piece in _unbent(view, surface, linked, members)]
+    found = [_fit(view, surface, edges, linked, members) for members in straight]
     return tuple(sorted((edge for edge in found if edge is not None and edge.length >= min_length), key=lambda edge: -edge.length))
+
+
+def _unbent(view: DepthView, surface: Surface, linked: Linked, members: NDArray, depth: int = 0) -> list[NDArray]:
+    """A segment that is straight in the image, cut where it bends in depth: where two edges run on in one line."""
+    if len(members) < 2 * MIN_PIXELS or depth == MAX_BENDS:
+        return [members]
+    u, v = linked.u[members], linked.v[members]
+    spread = np.linalg.svd(np.c_[u - u.mean(), v - v.mean()], full_matrices=False)[2][0]
+    order = np.argsort(u * spread[0] + v * spread[1], kind="stable")
+    members = members[order]
+    along = (u * spread[0] + v * spread[1])[order]
+    heights = ndimage.median_filter(surface.points[v[order], u[order], 2], size=7, mode="nearest")
+    ends = max(3, len(members) // 8)
+    a, b = (np.array([along[part].mean(), heights[part].mean()]) for part in (slice(0, ends), slice(-ends, None)))
+    chord = a[1] + (along - a[0]) * (b[1] - a[1]) / max(b[0] - a[0], 1e-9)
+    off = np.abs(heights - chord)
+    cut = int(np.argmax(off))
+    if off[cut] < 4.0 * view.noise + 0.25 * view.outline_error or not MIN_PIXELS <= cut < len(members) - MIN_PIXELS:
+        return [members]
+    return [piece for half in (members[:cut], members[cut:]) for piece in _unbent(view, surface, linked, half, depth + 1)]
 
 
 def _fit(view: DepthView, surface: Surface, edges: EdgePixels, linked: Linked, members: NDArray) -> DataEdge | None:
