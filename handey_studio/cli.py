@@ -13,13 +13,13 @@ import numpy as np
 
 from handey_studio.base import BadInput, Entry
 from handey_studio.base.files import replace_file
-from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.localization import LocateOptions, localize
 from handey_studio.localization.report import locate_report
 from handey_studio.sensing.files import read_depth
 from handey_studio.sensing.support import support_plane
 from handey_studio.session import Session, find_session, read_session, write_session
-from handey_studio.task import MoveCommand, MoveOptions, MoveResult, Station, describe, run_move
+from handey_studio.session.run import cell_of, setup_of, station_of
+from handey_studio.task import MoveCommand, MoveOptions, MoveResult, describe, run_move
 from handey_studio.task.bench import bench_piles
 from handey_studio.task.report import move_report
 from handey_studio.world import Library
@@ -121,7 +121,9 @@ def _locate(given: argparse.Namespace) -> int:
         return NOTHING_FOUND
     for pose in result.poses:
         x, y, z = pose.T_world_part[:3, 3]
-        print(f"{pose.part} at {x:.4f}, {y:.4f}, {z:.4f} m, score {pose.score:.2f}, {pose.edges_found} of {pose.edges_predicted} edges found")
+        print(
+            f"{pose.part} at {x:.4f}, {y:.4f}, {z:.4f} m, score {pose.score:.2f}, {pose.edges_found} of {pose.edges_predicted} edges found"
+        )
     return DONE
 
 
@@ -138,9 +140,7 @@ def _run_moves(given: argparse.Namespace, execute: bool) -> int:
     session = read_session(find_session(library, given.session))
     commands = _commands(given, session)
     seed = session.seed if given.seed is None else given.seed
-    robot = library.robot(session.workcell.robot)
-    station = Station(session.workcell, robot, session.parts)
-    cell = SimulatedCell(session.workcell, library)
+    station, cell = station_of(session, library), cell_of(session, library)
     results, scene = [], None
     for command in commands:
         scene, result = run_move(station, cell, command, MoveOptions(seed=seed), execute, _Lines())
@@ -149,9 +149,10 @@ def _run_moves(given: argparse.Namespace, execute: bool) -> int:
         if result.status == "failed":
             break
     if given.json:
-        _write_json(given.json, move_report(results, robot))
+        _write_json(given.json, move_report(results, station.robot))
     if given.save:
-        write_session(given.save, replace(session, commands=commands, seed=seed, scene=scene, results=tuple(results)))
+        now = setup_of(session, cell) if execute else session.cell_now
+        write_session(given.save, replace(session, commands=commands, seed=seed, scene=scene, results=tuple(results), cell_now=now))
     return DONE if len(results) == len(commands) and all(result.status != "failed" for result in results) else FAILED
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from handey_studio.base import rejected_counts
+from handey_studio.base import Entry, rejected_counts
 from handey_studio.motion import Certificate
 from handey_studio.task.plan import GraspChoice, MoveResult, Step
 from handey_studio.world import Robot
@@ -33,10 +33,20 @@ def _move(result: MoveResult) -> dict[str, Any]:
         "steps": [_step(step) for step in plan.steps] if plan else [],
         "certificate": certificate_report(plan.certificate) if plan else None,
         "options": {"tried": len(options), "rejected": rejected_counts(options)},
-        "ledger": [asdict(entry) for entry in result.ledger],
+        "ledger": [_entry(entry) for entry in result.ledger],
         "physics": result.physics,
         "timing_s": result.timing_s,
     }
+
+
+def _entry(entry: Entry) -> dict[str, Any]:
+    """An entry with its numbers as JSON has them: what is not finite is null."""
+    numbers = {key: _finite(getattr(entry, key)) for key in ("value", "limit")}
+    return asdict(entry) | numbers
+
+
+def _finite(value: float | None) -> float | None:
+    return float(value) if value is not None and np.isfinite(value) else None
 
 
 def _grasp(grasp: GraspChoice) -> dict[str, Any]:
@@ -72,7 +82,7 @@ def certificate_report(certificate: Certificate) -> dict[str, Any]:
     """What was proved: the least clearance [m], where, between which bodies, and the margin that every pair keeps."""
     return {
         "proved": certificate.proved,
-        "least_clearance_m": certificate.least_clearance if np.isfinite(certificate.least_clearance) else None,
+        "least_clearance_m": _finite(certificate.least_clearance),
         "bodies": list(certificate.bodies),
         "at_stretch": certificate.at[0],
         "at_share": certificate.at[1],
