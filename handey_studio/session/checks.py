@@ -65,7 +65,7 @@ def _check_counts(session: Session) -> None:
 
 
 def _walk(value: Any, path: str) -> Iterator[tuple[str, Any]]:
-    """Every value inside a session with its path, such as `session.scan.T_world_range`."""
+    """Every value inside a session with its path, such as `session.scene.depth_map.T_world_range`."""
     yield path, value
     if is_dataclass(value):
         for f in fields(value):

@@ -9,6 +9,7 @@ from handey_studio.base import Value, frozen_array
 from handey_studio.cell.workcell import SimulatedSetup, Workcell
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.task.plan import MoveCommand, MoveResult
+from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Part, PlacedPart
 
 LAYERS = ("robot", "depth map", "located parts", "data edges", "hypothesis", "grasp", "hand path", "destination", "labels")
@@ -38,8 +39,8 @@ class ViewState(Value):
 class Session(Value):
     """One working session, self-contained: it opens on a machine that lacks its parts.
 
-    `parts` are the models that `workcell.parts` names. `scan`, `located` and `results` are what sensing and planning
-    found, empty before. `cell_now` is where the simulated bodies stand after what was executed, None while nothing was;
+    `parts` are the models that `workcell.parts` names. `scene` and `results` are what sensing and planning found,
+    empty before. `cell_now` is where the simulated bodies stand after what was executed, None while nothing was;
     only the cell reads it.
     """
 
@@ -48,11 +49,20 @@ class Session(Value):
     parts: tuple[Part, ...] = ()
     commands: tuple[MoveCommand, ...] = ()
     seed: int = 0
-    scan: DepthMap | None = None
-    located: tuple[PlacedPart, ...] = ()
+    scene: Scene | None = None
     results: tuple[MoveResult, ...] = ()
     cell_now: SimulatedSetup | None = None
     view: ViewState = field(default_factory=ViewState)
+
+    @property
+    def scan(self) -> DepthMap | None:
+        """The depth map, None before the first scan."""
+        return self.scene.depth_map if self.scene else None
+
+    @property
+    def located(self) -> tuple[PlacedPart, ...]:
+        """The instances that were found in it."""
+        return self.scene.instances if self.scene else ()
 
     @property
     def result(self) -> MoveResult | None:
@@ -68,7 +78,7 @@ class Session(Value):
     def without_findings(self) -> "Session":
         """The session as before its first scan: what the user set stays, what was sensed and planned goes."""
         view = replace(self.view, time_s=0.0, hypothesis=-1, edge=-1, result=-1)
-        return replace(self, scan=None, located=(), results=(), cell_now=None, view=view)
+        return replace(self, scene=None, results=(), cell_now=None, view=view)
 
 
 def new_session(name: str, workcell: Workcell, library: Library, commands: tuple[MoveCommand, ...] = (), seed: int = 0) -> Session:

@@ -8,10 +8,12 @@ from handey_studio.base import Ledger
 from handey_studio.cell.workcell import Workcell
 from handey_studio.geometry.transforms import from_xyz_rpy, inverse
 from handey_studio.grasping import BumpRun, GraspPlane
+from handey_studio.localization import DataEdge, Hypothesis, LocateResult
 from handey_studio.motion import Certificate
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session import Session, new_session
 from handey_studio.task.plan import GraspChoice, MoveCommand, MovePlan, MoveResult, Step
+from handey_studio.task.sense import Scene
 from handey_studio.world import Library, PlacedPart, Robot, arm_of
 
 T_START = from_xyz_rpy((0.48, 0.02, 0.0), (0.0, 0.0, 0.3))
@@ -64,6 +66,20 @@ def hand_made_approach() -> BumpRun:
     return BumpRun(plane, path, path[-1, :2], "reached", 0.0)
 
 
+def hand_made_edges() -> tuple[DataEdge, ...]:
+    """Two edges on the table."""
+    ends = np.array([[[0.40, 0.0, 0.03], [0.46, 0.02, 0.03]], [[0.46, 0.02, 0.03], [0.44, 0.06, 0.03]]])
+    up = np.array([[0.0, 0.0, 1.0]])
+    return tuple(DataEdge("jump", pair, pair, up, up, 40, 0.0003) for pair in ends)
+
+
+def hand_made_hypotheses() -> tuple[Hypothesis, ...]:
+    """One that stood and one that fell."""
+    aside = from_xyz_rpy((0.44, 0.06, 0.0))
+    fell = Hypothesis("brick", aside, 0.31, 0.05, 0.11, (0, 1), "too few edges found")
+    return (Hypothesis("l_block", T_START, 0.93, 0.20, 0.01, (0, 1), None), fell)
+
+
 def line(robot: Robot, kind, start, end, opening, T_hand_part=None, held=None) -> Step:
     """A step of two seconds in 21 samples."""
     s = np.linspace(0.0, 1.0, 21)
@@ -100,4 +116,5 @@ def full_session(folder) -> Session:
     result = MoveResult(session.commands[0], "planned", "", plan, ledger=ledger(), timing_s={"sense": 1.25, "plan": 3.5})
     brick = PlacedPart("brick#1", session.parts[1], from_xyz_rpy((0.42, -0.08, 0.0)))
     located = (PlacedPart("l_block#1", session.parts[0], T_START), brick)
-    return replace(session, scan=hand_made_scan(), located=located, results=(result,))
+    scene = Scene(hand_made_scan(), LocateResult((), hand_made_edges(), hand_made_hypotheses(), ()), located)
+    return replace(session, scene=scene, results=(result,))

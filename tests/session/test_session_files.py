@@ -134,8 +134,8 @@ def test_what_is_no_session_is_refused(fresh, schema):
 
 def test_a_skewed_frame_is_refused_by_its_path(full):
     plain = plain_of(full)
-    plain["located"][0]["T_world_part"]["array"][0][0] = 2.0
-    assert "session.located[0].T_world_part is not a rigid 4×4 transform" in refused(plain)
+    plain["scene"]["instances"][0]["T_world_part"]["array"][0][0] = 2.0
+    assert "session.scene.instances[0].T_world_part is not a rigid 4×4 transform" in refused(plain)
 
 
 def test_a_part_with_a_hole_is_refused(full):
@@ -158,7 +158,7 @@ def test_not_finite_numbers_are_refused(full):
 
 def test_an_array_that_claims_more_than_the_limit_is_refused_unread(full):
     plain = plain_of(full)
-    plain["scan"]["elevation"]["shape"] = [10_000, 10_000]
+    plain["scene"]["depth_map"]["elevation"]["shape"] = [10_000, 10_000]
     assert "the limit is 20000000" in refused(plain)
 
 

@@ -1,0 +1,202 @@
+"""What a user can ask for that reaches beyond the state: files, the planner, a single browser."""
+
+import logging
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.app.commands import JobStarted
+from handey_studio.app.state import State, opened
+from handey_studio.base import BadInput
+from handey_studio.session import (
+    Session,
+    check_name,
+    find_session,
+    own_file,
+    read_session,
+    session_from_bytes,
+    session_to_bytes,
+    write_session,
+)
+from handey_studio.world.library import bundled
+
+log = logging.getLogger(__name__)
+
+MAX_UPLOAD_BYTES = 64_000_000
+
+
+class Bench(Protocol):
+    """What an action may use of the workbench."""
+
+    state: State
+    planner: Any
+
+    def client(self, number: int | None) -> Any: ...
+    def look(self, position: NDArray, look_at: NDArray, client: int | None) -> None: ...
+
+
+class Action(Protocol):
+    """An action returns the next state. Raises BadInput with one sentence."""
+
+    def run(self, bench: Bench) -> State: ...
+
+
+@dataclass(frozen=True)
+class NewSession:
+    """The same workcell with nothing found yet."""
+
+    name: str = "untitled"
+
+    def run(self, bench: Bench) -> State:
+        state, kept = _put_away(bench.state)
+        session = replace(state.session.without_findings(), name=check_name(self.name))
+        return _shown(bench, opened(state.library, session, None, state), f"New session in the same workcell.{kept}")
+
+
+@dataclass(frozen=True)
+class OpenSession:
+    """A session of the library by its name."""
+
+    name: str
+
+    def run(self, bench: Bench) -> State:
+        if self.name not in bench.state.library.sessions():
+            find_session(bench.state.library, self.name)
+        path = bench.state.library.sessions()[self.name]
+        session = read_session(path)
+        state, kept = _put_away(bench.state)
+        return _shown(bench, opened(state.library, session, path, state), f'Opened "{session.name}".{kept}')
+
+
+@dataclass(frozen=True, eq=False)
+class UploadSession:
+    """A session file from the user's own machine. It is not written anywhere until it is saved."""
+
+    file_name: str
+    content: bytes
+
+    def run(self, bench: Bench) -> State:
+        if len(self.content) > MAX_UPLOAD_BYTES:
+            raise BadInput(f'"{self.file_name}" has {len(self.content)} bytes, the limit for a session is {MAX_UPLOAD_BYTES}.')
+        session = session_from_bytes(self.content, self.file_name)
+        state, kept = _put_away(bench.state)
+        return _shown(bench, opened(state.library, session, None, state), f'Opened "{session.name}" from the upload.{kept}')
+
+
+@dataclass(frozen=True)
+class SaveSession:
+    """To its file; a bundled example goes to the user's own library under the same name."""
+
+    def run(self, bench: Bench) -> State:
+        path = bench.state.path
+        if path is None or not _writable(path, bench.state):
+            path = own_file(bench.state.library, bench.state.session.name)
+        return _saved(bench.state, bench.state.session, path)
+
+
+@dataclass(frozen=True)
+class SaveSessionAs:
+    """To the library under a new name."""
+
+    name: str
+
+    def run(self, bench: Bench) -> State:
+        session = replace(bench.state.session, name=check_name(self.name.strip()))
+        return _saved(bench.state, session, own_file(bench.state.library, session.name))
+
+
+@dataclass(frozen=True)
+class DownloadSession:
+    client: int | None
+
+    def run(self, bench: Bench) -> State:
+        client = bench.client(self.client)
+        if client is not None:
+            session = bench.state.session
+            client.send_file_download(f"{session.name}.handey", session_to_bytes(session), save_immediately=True)
+        return bench.state
+
+
+@dataclass(frozen=True)
+class StartMove:
+    """Sense and plan; with `execute` the cell carries it out."""
+
+    execute: bool
+
+    def run(self, bench: Bench) -> State:
+        state = bench.state
+        if state.job is not None:
+            raise BadInput("the planner is at work; cancel first or wait for it.")
+        if state.command is None:
+            raise BadInput("choose a part to move first.")
+        state = JobStarted(self.execute).apply(state)
+        bench.planner.order(state.jobs, state.session, state.library, self.execute)
+        return state
+
+
+@dataclass(frozen=True)
+class CancelMove:
+    def run(self, bench: Bench) -> State:
+        if bench.state.job is None:
+            return bench.state
+        bench.planner.cancel()
+        return replace(bench.state, job=replace(bench.state.job, cancelling=True))
+
+
+@dataclass(frozen=True)
+class LookFrom:
+    """One browser's camera goes to a named place."""
+
+    view: str
+    client: int | None
+
+    def run(self, bench: Bench) -> State:
+        position, look_at = viewpoint(self.view, bench.state)
+        bench.look(position, look_at, self.client)
+        return bench.state
+
+
+def viewpoint(view: str, state: State) -> tuple[NDArray, NDArray]:
+    """Camera position and point to look at (3,) [m] of a named view."""
+    finder = state.session.workcell.finder
+    middle = finder.T_world_range[:3, 3] + finder.T_world_range[:3, :3] @ (finder.area[0] / 2, finder.area[1] / 2, 0.0)
+    if view == "Top":
+        return middle + (-0.001, 0.0, 0.85), middle
+    if view == "Pile":
+        return middle + (0.38, -0.42, 0.36), middle + (0.0, 0.0, 0.03)
+    if view == "Grasp" and state.replay is not None:
+        at = state.replay.plan.T_world_part_start[:3, 3]
+        return at + (0.22, -0.26, 0.20), at + (0.0, 0.0, 0.03)
+    if view == "Hand" and state.replay is not None:
+        at = state.replay.at(state.session.view.time_s).T_world_part[:3, 3]
+        return at + (0.30, -0.34, 0.26), at
+    return np.array([1.42, -1.02, 0.92]), np.array([0.26, -0.02, 0.20])
+
+
+def _saved(state: State, session: Session, path: Path) -> State:
+    write_session(path, session)
+    return replace(state, session=session, saved=session, path=path).told(f'Saved "{session.name}" to {path}.', "good")
+
+
+def _writable(path: Path, state: State) -> bool:
+    """Bundled sessions are read-only, unless the bundle is the user's own library."""
+    return not path.is_relative_to(bundled()) or path.is_relative_to(state.library.folder)
+
+
+def _put_away(state: State) -> tuple[State, str]:
+    """Before another session comes: what was not saved goes to the library, and the planner may not be at work."""
+    if state.job is not None:
+        raise BadInput("the planner is at work; cancel first or wait for it.")
+    if not state.unsaved or (state.saved is None and not state.session.results and not state.undo):
+        return state, ""
+    path = own_file(state.library, f"{state.session.name} (unsaved)"[:120])
+    write_session(path, replace(state.session, name=path.stem))
+    return state, f' What was not saved is kept as "{path.stem}".'
+
+
+def _shown(bench: Bench, state: State, sentence: str) -> State:
+    bench.look(state.session.view.camera_position, state.session.view.camera_look_at, None)
+    return state.told(sentence)

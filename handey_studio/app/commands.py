@@ -1,0 +1,330 @@
+"""What a user can ask for, as values. Those here only make the next state; those that touch files, the planner or a
+single browser are in `actions.py`."""
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.app.state import Job, State, redone, undone
+from handey_studio.base import BadInput
+from handey_studio.geometry.transforms import is_rigid
+from handey_studio.session import Session
+from handey_studio.session.destination import check_command, destination_pose, destinations_on_parts, snapped
+from handey_studio.task.destination import format_pose
+from handey_studio.task.plan import MoveCommand
+
+POSE_LABEL = "a pose on the table"
+FREE_TABLE = "0.35,-0.35,0,0,0,0"  # beside the scan area, in every robot's reach
+
+
+class Command(Protocol):
+    """A command that makes the next state and does nothing else. Raises BadInput with one sentence."""
+
+    def apply(self, state: State) -> State: ...
+
+
+@dataclass(frozen=True)
+class ChoosePart:
+    """MOVE this part, to where parts of its kind can go."""
+
+    part: str
+
+    def apply(self, state: State) -> State:
+        part = state.session.part(self.part)
+        if part is None:
+            raise BadInput(f'part "{self.part}" is not in this workcell; it has {", ".join(state.session.workcell.parts) or "none"}.')
+        mates = destinations_on_parts(state.session, part)
+        free = state.command is not None and not state.command.to.startswith("on:")
+        to = state.command.to if state.command and free else (mates[0] if mates else FREE_TABLE)
+        return _with_command(state, f"choose {self.part}", MoveCommand(self.part, to))
+
+
+@dataclass(frozen=True)
+class SetDestination:
+    """TO these words: `x,y,z[,roll,pitch,yaw]` or `on:PART[:POSE]`."""
+
+    to: str
+    label: str = "set destination"
+
+    def apply(self, state: State) -> State:
+        if state.command is None:
+            raise BadInput("choose a part to move first.")
+        return _with_command(state, self.label, MoveCommand(state.command.part, self.to))
+
+
+@dataclass(frozen=True, eq=False)
+class DropGhost:
+    """The ghost was let go at this pose; it snaps."""
+
+    T_world_part: NDArray
+
+    def apply(self, state: State) -> State:
+        part = state.session.part(state.command.part) if state.command else None
+        if part is None or not is_rigid(self.T_world_part, 1e-3):
+            return state
+        to = format_pose(snapped(part, self.T_world_part, state.session.workcell.table_z))
+        return SetDestination(to, "drag destination").apply(state)
+
+
+@dataclass(frozen=True)
+class FreePose:
+    """The destination becomes a pose of its own, where the ghost is now, or on free table if it has no place yet."""
+
+    def apply(self, state: State) -> State:
+        pose = destination_pose(state.session, state.command) if state.command else None
+        to = format_pose(pose) if pose is not None else FREE_TABLE
+        return SetDestination(to, f"choose {POSE_LABEL}").apply(state)
+
+
+@dataclass(frozen=True)
+class SetSeed:
+    seed: int
+
+    def apply(self, state: State) -> State:
+        if not 0 <= self.seed < 2**31:
+            raise BadInput(f"the seed is {self.seed}; it must be a whole number from 0 to {2**31 - 1}.")
+        return state.changed("set seed", replace(state.session, seed=self.seed))
+
+
+@dataclass(frozen=True)
+class Undo:
+    def apply(self, state: State) -> State:
+        return undone(state)
+
+
+@dataclass(frozen=True)
+class Redo:
+    def apply(self, state: State) -> State:
+        return redone(state)
+
+
+@dataclass(frozen=True)
+class Seek:
+    """Look at this time [s] of the plan."""
+
+    time_s: float
+    keep_playing: bool = False
+
+    def apply(self, state: State) -> State:
+        replay = state.replay
+        time_s = float(np.clip(self.time_s, 0.0, replay.duration)) if replay else 0.0
+        return replace(with_view(state, time_s=time_s), playing=state.playing and self.keep_playing)
+
+
+@dataclass(frozen=True)
+class SeekStep:
+    """To the start of the step before (-1) or after (+1); ±99 goes to the ends."""
+
+    by: int
+
+    def apply(self, state: State) -> State:
+        replay = state.replay
+        if replay is None:
+            return state
+        now = state.session.view.time_s
+        later = [t for t in replay.starts if t > now + 1e-6] or [replay.duration]
+        earlier = [t for t in replay.starts if t < now - 1e-6] or [0.0]
+        ends = {99: replay.duration, -99: 0.0}
+        return Seek(ends.get(self.by, later[0] if self.by > 0 else earlier[-1])).apply(state)
+
+
+@dataclass(frozen=True)
+class TogglePlay:
+    """Play from here, or from the start when the end was reached; or pause."""
+
+    def apply(self, state: State) -> State:
+        replay = state.replay
+        if replay is None:
+            return replace(state, playing=False)
+        if not state.playing and state.session.view.time_s >= replay.duration - 1e-6:
+            state = with_view(state, time_s=0.0)
+        return replace(state, playing=not state.playing)
+
+
+@dataclass(frozen=True)
+class Tick:
+    """This much wall-clock time [s] went by while playing."""
+
+    seconds: float
+
+    def apply(self, state: State) -> State:
+        replay = state.replay
+        if not state.playing or replay is None:
+            return replace(state, playing=False)
+        time_s = state.session.view.time_s + self.seconds * state.speed
+        if time_s < replay.duration:
+            return with_view(state, time_s=time_s)
+        return with_view(state, time_s=0.0) if state.loop else replace(with_view(state, time_s=replay.duration), playing=False)
+
+
+@dataclass(frozen=True)
+class SetPlayback:
+    speed: float | None = None
+    loop: bool | None = None
+
+    def apply(self, state: State) -> State:
+        return replace(state, speed=self.speed or state.speed, loop=state.loop if self.loop is None else self.loop)
+
+
+@dataclass(frozen=True)
+class ShowLayer:
+    layer: str
+    shown: bool
+
+    def apply(self, state: State) -> State:
+        hidden = tuple(layer for layer in state.session.view.hidden_layers if layer != self.layer)
+        return with_view(state, hidden_layers=hidden if self.shown else (*hidden, self.layer))
+
+
+@dataclass(frozen=True)
+class Select:
+    """Look at one hypothesis, data edge or result; -1 for none (the last result)."""
+
+    kind: str
+    number: int
+
+    def apply(self, state: State) -> State:
+        if self.kind == "result":
+            state = with_view(state, time_s=0.0)
+        return with_view(state, **{self.kind: self.number})
+
+
+@dataclass(frozen=True)
+class FilterLedger:
+    stage: str | None = None
+    only: str | None = None
+    words: str | None = None
+
+    def apply(self, state: State) -> State:
+        return replace(
+            state,
+            ledger_stage=state.ledger_stage if self.stage is None else self.stage,
+            ledger_only=state.ledger_only if self.only is None else self.only,
+            ledger_words=state.ledger_words if self.words is None else self.words[:80],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class CameraMoved:
+    """A browser's camera stands here (3,) and looks there (3,) [m]; kept so that reopening shows the same view."""
+
+    position: NDArray
+    look_at: NDArray
+
+    def apply(self, state: State) -> State:
+        if not (np.isfinite(self.position).all() and np.isfinite(self.look_at).all()):
+            return state
+        return with_view(state, camera_position=self.position, camera_look_at=self.look_at)
+
+
+@dataclass(frozen=True)
+class Viewers:
+    """A browser came or went."""
+
+    by: int
+
+    def apply(self, state: State) -> State:
+        return replace(state, viewers=max(0, state.viewers + self.by))
+
+
+@dataclass(frozen=True)
+class Tell:
+    text: str
+    kind: str = "info"
+    client: int | None = None
+
+    def apply(self, state: State) -> State:
+        return state.told(self.text, self.kind, self.client)
+
+
+@dataclass(frozen=True)
+class JobProgress:
+    number: int
+    fraction: float
+    message: str
+
+    def apply(self, state: State) -> State:
+        if state.job is None or state.job.number != self.number:
+            return state
+        return replace(state, job=replace(state.job, fraction=self.fraction, message=self.message))
+
+
+@dataclass(frozen=True, eq=False)
+class JobShows:
+    """The planner has something to show before it is done: the session with what was found so far."""
+
+    number: int
+    session: Session
+
+    def apply(self, state: State) -> State:
+        if state.job is None or state.job.number != self.number:
+            return state
+        return replace(state, session=merged(state.session, self.session), playing=False)
+
+
+@dataclass(frozen=True, eq=False)
+class JobDone:
+    """The planner is through; the result plays from its start."""
+
+    number: int
+    session: Session
+
+    def apply(self, state: State) -> State:
+        if state.job is None or state.job.number != self.number:
+            return state
+        session = merged(state.session, self.session)
+        state = replace(state, session=session, job=None)
+        state = with_view(state, time_s=0.0, result=-1)
+        result = session.result
+        if result is None:
+            return state
+        kind = "bad" if result.status == "failed" else "good"
+        return replace(state, playing=state.replay is not None).told(outcome(result), kind)
+
+
+@dataclass(frozen=True)
+class JobFailed:
+    """The planner could not start on this, or broke down; the sentence says which."""
+
+    number: int
+    sentence: str
+
+    def apply(self, state: State) -> State:
+        if state.job is None or state.job.number != self.number:
+            return state
+        return replace(state, job=None).told(self.sentence, "bad")
+
+
+@dataclass(frozen=True)
+class JobStarted:
+    execute: bool
+
+    def apply(self, state: State) -> State:
+        return replace(state, jobs=state.jobs + 1, playing=False, job=Job(state.jobs + 1, self.execute))
+
+
+def with_view(state: State, **changes) -> State:
+    """The state with its view changed."""
+    return replace(state, session=replace(state.session, view=replace(state.session.view, **changes)))
+
+
+def merged(shown: Session, found: Session) -> Session:
+    """What the planner found put into the session on screen, whose settings may have changed meanwhile."""
+    return replace(shown, scene=found.scene, results=found.results, cell_now=found.cell_now)
+
+
+def outcome(result) -> str:
+    """One sentence about a result."""
+    what = f"MOVE {result.command.part} TO {result.command.to}"
+    if result.status == "failed":
+        return f"{what} failed: {result.reason}"
+    seconds = sum(float(step.time_s[-1]) for step in result.plan.steps)
+    return f"{what} is {'done' if result.status == 'done' else 'planned'}: {len(result.plan.steps)} steps, {seconds:.1f} s."
+
+
+def _with_command(state: State, label: str, command: MoveCommand) -> State:
+    check_command(state.session, command)
+    commands = (*state.session.commands[:-1], command)
+    return state.changed(label, replace(state.session, commands=commands))

@@ -1,0 +1,25 @@
+"""What to do next, said in one sentence for every state that the workbench can be in."""
+
+from handey_studio.app.state import State
+
+
+def next_step(state: State) -> tuple[str, str, str]:
+    """(title, sentence, tone)."""
+    session, job = state.session, state.job
+    if job is not None:
+        what = "Stopping" if job.cancelling else "Moving" if job.execute else "Planning"
+        return f"{what} …", job.message, "info"
+    if not session.workcell.parts:
+        return "This workcell has no part models", "Open a session that has some: Session → Open.", "quiet"
+    if state.command is None:
+        return "Choose a part", "Pick the part that the arm shall move, below.", "info"
+    result = session.result
+    if result is None:
+        return "Ready to MOVE", "Check the destination, then press Plan to look before anything moves, or MOVE to do it.", "info"
+    if result.command != state.command:
+        return "The command has changed", "What is shown belongs to the MOVE before. Press Plan or MOVE for the new one.", "info"
+    if result.status == "failed":
+        return "No plan was found", f"{result.reason} The ledger tells what was tried; another destination may do.", "bad"
+    if result.status == "planned":
+        return "Planned: look before it moves", "Play or scrub the timeline. MOVE carries it out.", "good"
+    return "Done", "The part was moved. Choose where it goes next, or save the session.", "good"

@@ -1,0 +1,61 @@
+"""Small pieces of HTML. Whatever a user or a file wrote is escaped here, before it reaches a browser."""
+
+from collections.abc import Iterable
+from html import escape
+
+from handey_studio.app import palette
+from handey_studio.app.palette import css
+
+TONES = {"info": palette.BLUE, "good": palette.TEAL, "bad": palette.VERMILLION, "quiet": palette.GREY}
+
+
+def esc(text: object) -> str:
+    """Text as HTML text."""
+    return escape(str(text), quote=True)
+
+
+def card(title: str, text: str, tone: str = "info", testid: str = "") -> str:
+    """A sentence with a coloured bar at its side."""
+    colour = css(TONES[tone])
+    return (
+        f'<div data-testid="{esc(testid)}" style="border-left:4px solid {colour};background:{colour}12;border-radius:4px;padding:8px 12px;'
+        f'margin:2px 12px 4px;line-height:1.4"><div style="font-weight:650;font-size:13px">{esc(title)}</div>'
+        f'<div style="font-size:12.5px;opacity:.85">{esc(text)}</div></div>'
+    )
+
+
+def facts(rows: Iterable[tuple[str, str]], testid: str = "") -> str:
+    """Names and values, one a line."""
+    lines = "".join(
+        f'<tr><td style="color:#6b7684;padding:1.5px 10px 1.5px 0;white-space:nowrap;vertical-align:top">{esc(name)}</td>'
+        f'<td style="padding:1.5px 0;font-variant-numeric:tabular-nums">{esc(value)}</td></tr>'
+        for name, value in rows
+    )
+    return f'<div data-testid="{esc(testid)}" style="margin:2px 14px;font-size:12.5px;line-height:1.35"><table>{lines}</table></div>'
+
+
+def empty(text: str, testid: str = "") -> str:
+    """What an empty pane says: how to fill it."""
+    return (
+        f'<div data-testid="{esc(testid)}" style="margin:10px 14px;padding:14px;border:1px dashed #c3cad3;border-radius:6px;'
+        f'color:#6b7684;font-size:12.5px;line-height:1.45;text-align:center">{esc(text)}</div>'
+    )
+
+
+def swatch(colour: palette.RGB, label: str) -> str:
+    """A coloured chip and what it means."""
+    return (
+        f'<span style="display:inline-flex;align-items:center;gap:6px;margin-right:12px"><span style="width:11px;height:11px;'
+        f'border-radius:3px;background:{css(colour)}"></span>{esc(label)}</span>'
+    )
+
+
+def millimetres(metres: float, digits: int = 0) -> str:
+    return f"{1e3 * metres:.{digits}f} mm"
+
+
+def number(value: float, unit: str) -> str:
+    """A ledger's number as people read it: lengths in mm, angles in degrees."""
+    scales = {"m": (1e3, "mm"), "rad": (57.29577951308232, "°"), "m²": (1e6, "mm²"), "m2": (1e6, "mm²"), "": (1.0, "")}
+    scale, shown = scales.get(unit, (1.0, unit))
+    return f"{value * scale:.4g} {shown}".strip()

@@ -1,0 +1,51 @@
+"""Colours with fixed meanings, chosen to be told apart without red and green: blue, orange, grey."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+RGB = tuple[int, int, int]
+
+BLUE: RGB = (0, 96, 168)  # what the user sets: the destination
+SKY: RGB = (86, 180, 233)  # hypotheses
+ORANGE: RGB = (236, 142, 32)  # what was located: parts
+VERMILLION: RGB = (204, 76, 24)  # what collided or fell
+TEAL: RGB = (0, 133, 124)  # the grasp
+INK: RGB = (32, 41, 53)
+GREY: RGB = (128, 138, 150)
+PALE: RGB = (214, 219, 226)
+ARM_LIGHT: RGB = (222, 227, 233)
+ARM_DARK: RGB = (92, 107, 124)
+HAND: RGB = (58, 68, 80)
+FINGER: RGB = (36, 44, 54)
+TABLE: RGB = (238, 236, 231)
+FLOOR: RGB = (226, 230, 235)
+BLOCK: RGB = (168, 176, 186)
+
+STEP_COLOURS: dict[str, RGB] = {
+    "free": (122, 134, 148),
+    "approach": TEAL,
+    "close": INK,
+    "lift": (226, 158, 62),
+    "transfer": ORANGE,
+    "regrasp": (120, 94, 180),
+    "place": (190, 104, 16),
+    "open": INK,
+    "retreat": (122, 134, 148),
+}
+
+# Elevation: from the table's blue grey over slate blue to a warm light yellow; lightness rises all the way, so it reads in grey too.
+ELEVATION = np.array(
+    [[196, 206, 217], [72, 100, 143], [61, 119, 160], [86, 150, 158], [146, 176, 134], [206, 194, 104], [252, 222, 112]], float
+)
+ELEVATION_AT = np.array([0.0, 0.05, 0.25, 0.45, 0.65, 0.82, 1.0])
+
+
+def css(colour: RGB) -> str:
+    """`#rrggbb`."""
+    return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+def elevation_colours(share: NDArray) -> NDArray:
+    """Colours (n, 3) uint8 for elevations (n,) as shares of the highest, in [0, 1]."""
+    share = np.clip(share, 0.0, 1.0)
+    return np.stack([np.interp(share, ELEVATION_AT, ELEVATION[:, k]) for k in range(3)], axis=-1).astype(np.uint8)

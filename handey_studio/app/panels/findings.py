@@ -1,0 +1,91 @@
+"""What was found: the result in numbers, the grasp with its plane, the path with its certificate."""
+
+import numpy as np
+import viser
+
+from handey_studio.app import html
+from handey_studio.app.state import State
+from handey_studio.app.svg import grasp_plane_html
+from handey_studio.geometry.transforms import pose_difference
+from handey_studio.task.plan import MovePlan, MoveResult
+
+NO_RESULT = "No MOVE was tried yet. Set the part and its destination on the left, then press Plan or MOVE."
+NO_GRASP = "No grasp yet. A plan shows here which faces are held, how the hand comes in, and what stood in its way."
+
+
+class ResultPanel:
+    """The outcome, the time each stage took, the certificate."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._pane = gui.add_html("")
+
+    def render(self, old: State | None, new: State) -> None:
+        if old is not None and old.session.result is new.session.result and old.loads == new.loads:
+            return
+        result = new.session.result
+        self._pane.content = result_html(result) if result else html.empty(NO_RESULT, "result-empty")
+
+
+class GraspPanel:
+    """The grasp in words and numbers, and the picture of the grasp plane."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._pane = gui.add_html("")
+
+    def render(self, old: State | None, new: State) -> None:
+        if old is not None and old.session.result is new.session.result and old.loads == new.loads:
+            return
+        plan = new.session.result.plan if new.session.result else None
+        if plan is None:
+            self._pane.content = html.empty(NO_GRASP, "grasp-empty")
+        else:
+            self._pane.content = html.facts(grasp_facts(plan), "grasp") + grasp_plane_html(plan.approach, new.robot.hand)
+
+
+def result_html(result: MoveResult) -> str:
+    """Status, reason, poses, certificate, seconds."""
+    tone = {"planned": "info", "done": "good", "failed": "bad"}[result.status]
+    title = f"MOVE {result.command.part} TO {result.command.to}"
+    said = {"planned": "Planned, not carried out yet.", "done": "Done."}.get(result.status, result.reason)
+    pane = html.card(title, said, tone, "result")
+    if result.plan is not None:
+        pane += html.facts(plan_facts(result.plan))
+    if result.T_world_part_reached is not None and result.plan is not None:
+        metres, radians = pose_difference(result.T_world_part_reached, result.plan.T_world_part_goal)
+        pane += html.facts([("Reached within", f"{1e3 * metres:.2f} mm, {np.rad2deg(radians):.2f}°")])
+    timing = [(stage, f"{seconds:.2f} s") for stage, seconds in result.timing_s.items()]
+    physics = "simulated with physics" if result.physics else "held part attached rigidly (no physics)"
+    return pane + _head("Seconds a stage") + html.facts([*timing, ("Execution", physics)], "timing")
+
+
+def plan_facts(plan: MovePlan) -> list[tuple[str, str]]:
+    """A plan's steps and what was proved of them."""
+    certificate = plan.certificate
+    proof = "proved collision-free" if certificate.proved else f"not proved: {certificate.reason}"
+    seconds = sum(float(step.time_s[-1]) for step in plan.steps)
+    return [
+        ("Steps", " → ".join(step.kind for step in plan.steps)),
+        ("Duration", f"{seconds:.1f} s, {plan.regrasps} regrasps"),
+        ("Path", f"{proof}, margin {html.millimetres(certificate.margin, 1)}"),
+        ("Closest", f"{html.millimetres(certificate.least_clearance, 1)} between {' and '.join(certificate.bodies) or 'nothing'}"),
+    ]
+
+
+def grasp_facts(plan: MovePlan) -> list[tuple[str, str]]:
+    """The grasp as the paper speaks of it."""
+    grasp = plan.grasp
+    ranges = ", ".join(f"{low:.0f}° to {high:.0f}°" for low, high in np.rad2deg(grasp.ranges).reshape(-1, 2))
+    return [
+        ("Grasp class", grasp.name),
+        ("Approach group", grasp.group),
+        ("Legal angles", ranges or "none"),
+        ("Chosen angle", f"{np.rad2deg(grasp.angle):.1f}°"),
+        ("Tilt", f"{np.rad2deg(grasp.tilts[0]):.0f}° at pickup, {np.rad2deg(grasp.tilts[1]):.0f}° at putdown"),
+        ("Fingers", f"{html.millimetres(grasp.width, 1)} held, {html.millimetres(grasp.opening)} open"),
+        ("Contact", f"{1e6 * grasp.contact_area:.0f} mm² each"),
+        ("Joint limits", f"{np.rad2deg(grasp.joint_margin):.0f}° away"),
+    ]
+
+
+def _head(text: str) -> str:
+    return f'<div style="font-weight:650;font-size:12.5px;margin:8px 14px 2px">{html.esc(text)}</div>'

@@ -1,0 +1,94 @@
+"""The right panel's head: the session's name, New, Open, Save, Save as, Download, Upload."""
+
+from typing import Any
+
+import viser
+
+from handey_studio.app import html
+from handey_studio.app.actions import DownloadSession, NewSession, OpenSession, SaveSession, SaveSessionAs, UploadSession
+from handey_studio.app.state import State
+from handey_studio.app.wire import Send, on_click, on_upload
+
+BUTTONS = ("New", "Open", "Save", "Save as")
+
+
+class SessionPanel:
+    """Dialogs open in the browser that asked for them."""
+
+    def __init__(self, server: viser.ViserServer, send: Send) -> None:
+        gui = server.gui
+        self._server, self._send = server, send
+        self._state: State | None = None
+        self._about = gui.add_html("")
+        buttons = gui.add_button_group("Session", BUTTONS)
+        files = gui.add_button_group("File", ("Download",))
+        upload = gui.add_upload_button("Upload a session …", icon=viser.Icon.UPLOAD, mime_type=".handey,application/gzip,application/json")
+        on_click(buttons, send, self._pressed)
+        on_click(files, send, lambda event: DownloadSession(event.client_id))
+        on_upload(upload, send, lambda event: UploadSession(event.target.value.name, event.target.value.content))
+
+    def _pressed(self, event: Any) -> Any:
+        choice = event.target.value
+        if choice == "Open":
+            self.ask_open(event.client)
+        elif choice == "Save as":
+            self.ask_name(event.client)
+        return {"New": NewSession(), "Save": SaveSession()}.get(choice)
+
+    def ask_open(self, client: viser.ClientHandle | None) -> None:
+        """A dialog with the library's sessions."""
+        if client is None or self._state is None:
+            return
+        names = tuple(sorted(self._state.library.sessions()))
+        modal = client.gui.add_modal("Open a session")
+        with modal:
+            if not names:
+                client.gui.add_html(html.empty("The library has no sessions yet. Save this one, or upload a file."))
+            choice = client.gui.add_dropdown("Name", names or ("–",), disabled=not names)
+            confirm = client.gui.add_button("Open this session", icon=viser.Icon.FOLDER_OPEN, disabled=not names)
+            close = client.gui.add_button("Close", color="gray")
+        self._close_with(modal, confirm, lambda: OpenSession(choice.value))
+        self._close_with(modal, close, lambda: None)
+
+    def ask_name(self, client: viser.ClientHandle | None) -> None:
+        """A dialog for a new name."""
+        if client is None or self._state is None:
+            return
+        modal = client.gui.add_modal("Save as")
+        with modal:
+            name = client.gui.add_text("Name", self._state.session.name)
+            confirm = client.gui.add_button("Save under this name", icon=viser.Icon.DEVICE_FLOPPY)
+            close = client.gui.add_button("Close", color="gray")
+        self._close_with(modal, confirm, lambda: SaveSessionAs(name.value))
+        self._close_with(modal, close, lambda: None)
+
+    def _close_with(self, modal: Any, button: Any, make: Any) -> None:
+        def pressed(_: Any) -> Any:
+            command = make()
+            modal.close()
+            return command
+
+        on_click(button, self._send, pressed)
+
+    def render(self, old: State | None, new: State) -> None:
+        self._state = new
+        if old is not None and _looks(old) == _looks(new):
+            return
+        mark = " *" if new.unsaved else ""
+        self._server.gui.set_panel_label(f"Handey Studio – {new.session.name}{mark}")
+        self._about.content = html.facts(_about(new), "session-about")
+
+
+def _about(state: State) -> list[tuple[str, str]]:
+    session = state.session
+    rows = [
+        ("Session", session.name + (" (not saved)" if state.unsaved else "")),
+        ("Robot", session.workcell.robot),
+        ("Parts", ", ".join(session.workcell.parts) or "none"),
+    ]
+    return [*rows, ("Viewers", str(state.viewers))] if state.viewers > 1 else rows
+
+
+def _looks(state: State) -> tuple:
+    session = state.session
+    return session.name, state.unsaved, session.workcell.robot, session.workcell.parts, state.viewers

@@ -1,0 +1,67 @@
+"""What a plan found: the path of the hand, the grasp with its faces and first edge."""
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from handey_studio.app import palette
+from handey_studio.app.scene.units import at, scaled
+from handey_studio.app.state import State
+from handey_studio.session import Replay
+from handey_studio.task.plan import GraspChoice
+
+PATH, GRASP = "/plan/hand_path", "/plan/grasp"
+SAMPLES = 240
+
+
+class PlanScene:
+    """The path, coloured by step, and the grasp in place on the part."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._root: viser.FrameHandle | None = None
+        self._grasp: viser.FrameHandle | None = None
+        self._path: viser.SceneNodeHandle | None = None
+
+    def render(self, old: State | None, new: State) -> None:
+        if old is None or old.session.result is not new.session.result:
+            self._build(new)
+        self._show(new)
+
+    def _build(self, state: State) -> None:
+        scene = self._server.scene
+        scene.remove_by_name("/plan")
+        self._path = self._grasp = None
+        replay = state.replay
+        if replay is None:
+            return
+        scene.add_frame("/plan", show_axes=False)
+        points, colours = coloured_path(replay)
+        self._path = scene.add_line_segments(PATH, scaled(points), colors=colours, thickness=3.0, thickness_units="screen")
+        self._grasp = add_grasp(scene, replay.plan.grasp, replay.plan.T_world_part_start)
+
+    def _show(self, state: State) -> None:
+        hidden = state.session.view.hidden_layers
+        for handle, layer in ((self._path, "hand path"), (self._grasp, "grasp")):
+            if handle is not None and handle.visible != (layer not in hidden):
+                handle.visible = layer not in hidden
+
+
+def coloured_path(replay: Replay) -> tuple[NDArray, NDArray]:
+    """Segments (n, 2, 3) [m] of the fingertips' path and their colours (n, 2, 3)."""
+    points = replay.hand_path(SAMPLES)
+    times = np.linspace(0.0, replay.duration, SAMPLES)
+    kinds = [replay.plan.steps[replay.step_at(t)].kind for t in times[:-1]]
+    colours = np.array([palette.STEP_COLOURS[kind] for kind in kinds], dtype=np.uint8)
+    return np.stack([points[:-1], points[1:]], axis=1), np.repeat(colours[:, None], 2, axis=1)
+
+
+def add_grasp(scene: viser.SceneApi, grasp: GraspChoice, T_world_part: NDArray) -> viser.FrameHandle:
+    """The outline where the fingers' faces face each other, and, thicker, the edge that is crossed first."""
+    frame = scene.add_frame(GRASP, show_axes=False, **at(T_world_part))
+    if len(grasp.contact_part) > 1:
+        loop = np.stack([grasp.contact_part, np.roll(grasp.contact_part, -1, axis=0)], axis=1)
+        scene.add_line_segments(f"{GRASP}/contact", scaled(loop), colors=palette.TEAL, thickness=3.0, thickness_units="screen")
+    edge = scaled(grasp.edge_part)[None]
+    scene.add_line_segments(f"{GRASP}/first_edge", edge, colors=palette.VERMILLION, thickness=6.0, thickness_units="screen")
+    return frame

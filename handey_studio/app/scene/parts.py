@@ -1,0 +1,68 @@
+"""Located parts as solid bodies with their edges; the part that a plan moves goes where the timeline says."""
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from handey_studio.app import palette
+from handey_studio.app.scene.units import at, place, scaled
+from handey_studio.app.state import State
+from handey_studio.world import Part
+
+ROOT = "/parts"
+
+
+def add_solid(
+    scene: viser.SceneApi, name: str, part: Part, colour: palette.RGB, T: NDArray, opacity: float | None = None, axes: bool = False
+) -> viser.FrameHandle:
+    """A frame at a pose with a part's faces and sharp edges below it."""
+    frame = scene.add_frame(name, show_axes=axes, axes_length=0.3, axes_radius=0.012, **at(T))
+    solid = part.solid
+    corners = solid.vertices[solid.triangles].reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    scene.add_mesh_simple(f"{name}/faces", scaled(corners), faces, color=colour, opacity=opacity, side="double" if opacity else "front")
+    edges = np.array([[solid.vertices[edge.start], solid.vertices[edge.end]] for edge in solid.edges])
+    dark = tuple(int(c * 0.55) for c in colour)
+    scene.add_line_segments(f"{name}/edges", scaled(edges), colors=dark, thickness=1.5, thickness_units="screen")
+    return frame
+
+
+class PartsScene:
+    """One node for each located instance, and one for the moved part while a plan is looked at."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._frames: dict[str, viser.FrameHandle] = {}
+        self._labels: dict[str, viser.LabelHandle] = {}
+
+    def render(self, old: State | None, new: State) -> None:
+        if old is None or old.session.located is not new.session.located:
+            self._build(new)
+            old = None
+        if old is None or _looks(old) != _looks(new):
+            self._place(new)
+
+    def _build(self, state: State) -> None:
+        for frame in self._frames.values():
+            frame.remove()
+        scene = self._server.scene
+        self._frames, self._labels = {}, {}
+        for number, placed in enumerate(state.session.located):
+            name = f"{ROOT}/{number}"
+            self._frames[placed.name] = add_solid(scene, name, placed.part, palette.ORANGE, placed.T_world_part)
+            top = placed.part.solid.vertices.mean(axis=0)
+            self._labels[placed.name] = scene.add_label(f"{name}/label", placed.name, position=scaled(top), font_screen_scale=0.75)
+
+    def _place(self, state: State) -> None:
+        hidden = state.session.view.hidden_layers
+        replay = state.replay
+        for placed in state.session.located:
+            moved = replay is not None and replay.plan.part == placed.name
+            T = replay.at(state.session.view.time_s).T_world_part if replay is not None and moved else placed.T_world_part
+            place(self._frames[placed.name], T)
+            self._frames[placed.name].visible = "located parts" not in hidden
+            self._labels[placed.name].visible = "labels" not in hidden
+
+
+def _looks(state: State) -> tuple:
+    return state.session.result, state.session.view.time_s, state.session.view.hidden_layers

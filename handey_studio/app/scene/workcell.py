@@ -1,0 +1,78 @@
+"""The workcell's furniture: floor, table, fixed blocks, the outline of what the range finder scans, light."""
+
+import numpy as np
+import viser
+
+from handey_studio.app import palette
+from handey_studio.app.scene.units import SCALE, at, scaled
+from handey_studio.app.state import State
+
+TABLE_M = (1.5, 1.5, 0.04)
+
+
+class WorkcellScene:
+    """Drawn anew when the workcell changes, which is when a session is opened."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._blocks: list[viser.SceneNodeHandle] = []
+        _light(server)
+
+    def render(self, old: State | None, new: State) -> None:
+        if old is not None and old.session.workcell is new.session.workcell:
+            return
+        scene, workcell = self._server.scene, new.session.workcell
+        _table(scene, workcell.table_z)
+        _scan_outline(scene, workcell)
+        for handle in self._blocks:
+            handle.remove()
+        self._blocks = [
+            scene.add_box(
+                f"/workcell/blocks/{number}", color=palette.BLOCK, dimensions=tuple(block.size * SCALE), **at(block.T_world_block)
+            )
+            for number, block in enumerate(workcell.blocks)
+        ]
+
+
+def _light(server: viser.ViserServer) -> None:
+    scene = server.scene
+    scene.set_up_direction("+z")
+    scene.configure_default_lights(enabled=False)
+    scene.add_light_hemisphere("/light/sky", sky_color=(255, 255, 255), ground_color=(196, 202, 210), intensity=1.6)
+    scene.add_light_directional("/light/key", color=(255, 250, 242), intensity=1.9, position=(9.0, -7.0, 16.0), cast_shadow=False)
+    scene.add_light_directional("/light/fill", color=(226, 236, 255), intensity=0.7, position=(-8.0, 9.0, 8.0), cast_shadow=False)
+    scene.set_background_image(_backdrop(), format="png")
+
+
+def _backdrop() -> np.ndarray:
+    """A quiet vertical gradient."""
+    top, bottom = np.array([247.0, 249.0, 251.0]), np.array([219.0, 225.0, 232.0])
+    share = np.linspace(0.0, 1.0, 256)[:, None, None]
+    return np.broadcast_to(top + share * (bottom - top), (256, 8, 3)).astype(np.uint8)
+
+
+def _table(scene: viser.SceneApi, table_z: float) -> None:
+    depth = TABLE_M[2] * SCALE
+    size = (TABLE_M[0] * SCALE, TABLE_M[1] * SCALE, depth)
+    scene.add_box("/workcell/table", color=palette.TABLE, dimensions=size, position=(2.0, 0.0, table_z * SCALE - depth / 2 - 0.01))
+    scene.add_grid(
+        "/workcell/grid",
+        width=size[0],
+        height=size[1],
+        cell_size=1.0,
+        section_size=5.0,
+        cell_color=(222, 220, 214),
+        section_color=(204, 202, 196),
+        cell_thickness=1.0,
+        section_thickness=1.2,
+        position=(2.0, 0.0, table_z * SCALE),
+    )
+
+
+def _scan_outline(scene: viser.SceneApi, workcell) -> None:
+    """The rectangle on the table that the range finder scans."""
+    x, y = workcell.finder.area
+    corners = np.array([[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]], dtype=float)
+    corners = corners @ workcell.finder.T_world_range[:3, :3].T + workcell.finder.T_world_range[:3, 3] + (0, 0, 0.0015)
+    sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    scene.add_line_segments("/workcell/scan_area", scaled(sides), colors=palette.BLUE, thickness=2.0, thickness_units="screen")

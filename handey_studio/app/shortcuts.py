@@ -1,0 +1,33 @@
+"""Keyboard commands; the palette (Ctrl+K) lists them all. W A S D Q E and the arrows belong to the browser's camera."""
+
+import viser
+
+from handey_studio.app.actions import CancelMove, LookFrom, SaveSession, StartMove
+from handey_studio.app.commands import Redo, SeekStep, TogglePlay, Undo
+from handey_studio.app.panels.session import SessionPanel
+from handey_studio.app.wire import Send, on_trigger
+
+KEYS = (
+    ("Save the session", "S", "cmd/ctrl", SaveSession()),
+    ("Undo", "Z", "cmd/ctrl", Undo()),
+    ("Redo", "Z", "cmd/ctrl+shift", Redo()),
+    ("Play or pause", "space", None, TogglePlay()),
+    ("Step back", "J", None, SeekStep(-1)),
+    ("Step on", "L", None, SeekStep(1)),
+    ("To the start", "home", None, SeekStep(-99)),
+    ("To the end", "end", None, SeekStep(99)),
+    ("Plan", "P", None, StartMove(execute=False)),
+    ("MOVE", "M", None, StartMove(execute=True)),
+    ("Cancel planning", "escape", None, CancelMove()),
+)
+VIEW_KEYS = (("1", "Workcell"), ("2", "Pile"), ("3", "Top"), ("4", "Grasp"), ("5", "Hand"))
+
+
+def add_shortcuts(gui: viser.GuiApi, send: Send, session: SessionPanel) -> None:
+    """Register every command with its key."""
+    for label, key, modifier, command in KEYS:
+        on_trigger(gui.add_command(label, hotkey=key, modifier=modifier), send, lambda _, command=command: command)
+    for key, view in VIEW_KEYS:
+        on_trigger(gui.add_command(f"Look: {view}", hotkey=key), send, lambda event, view=view: LookFrom(view, event.client_id))
+    opening = gui.add_command("Open a session", hotkey="O", modifier="cmd/ctrl")
+    on_trigger(opening, send, lambda event: session.ask_open(event.client))

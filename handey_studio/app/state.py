@@ -1,0 +1,146 @@
+"""The workbench's state: one frozen value. The next state is a new value; nothing here knows of a browser."""
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+
+from handey_studio.session import Replay, Session
+from handey_studio.task.plan import MoveCommand
+from handey_studio.world import Library, Robot
+
+MAX_UNDO = 100
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the user sets and can take back: the MOVE commands and the seed."""
+
+    commands: tuple[MoveCommand, ...]
+    seed: int
+
+    @classmethod
+    def of(cls, session: Session) -> "Settings":
+        return cls(session.commands, session.seed)
+
+    def put_into(self, session: Session) -> Session:
+        return replace(session, commands=self.commands, seed=self.seed)
+
+
+@dataclass(frozen=True)
+class Change:
+    """One undoable step: what it was called, and the settings before it."""
+
+    label: str
+    before: Settings
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the planner is doing. `execute`: whether the cell carries the plan out."""
+
+    number: int
+    execute: bool
+    fraction: float = 0.0
+    message: str = "Starting the planner …"
+    cancelling: bool = False
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A sentence for the user. `client` says whose browser it is for, None for everyone's."""
+
+    number: int
+    text: str
+    kind: str = "info"  # info, good or bad
+    client: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Everything that the screen shows. `saved` is the session as it is on disk at `path`."""
+
+    library: Library
+    session: Session
+    robot: Robot
+    saved: Session | None = None
+    path: Path | None = None
+    undo: tuple[Change, ...] = ()
+    redo: tuple[Change, ...] = ()
+    job: Job | None = None
+    jobs: int = 0
+    playing: bool = False
+    speed: float = 1.0
+    loop: bool = False
+    notices: tuple[Notice, ...] = ()
+    viewers: int = 0
+    ledger_stage: str = ""
+    ledger_only: str = "all"
+    ledger_words: str = ""
+    loads: int = field(default=0)
+
+    @property
+    def replay(self) -> Replay | None:
+        """The plan that is looked at, played over time."""
+        result = self.session.result
+        if result is None or result.plan is None or not result.plan.steps:
+            return None
+        return _replay(self.robot, result.plan)
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether something worth keeping differs from the file. How one looks at it is not worth a question."""
+        return self.saved is None or _kept(self.saved) != _kept(self.session)
+
+    @property
+    def command(self) -> MoveCommand | None:
+        """The MOVE that is set up."""
+        return self.session.commands[-1] if self.session.commands else None
+
+    def told(self, text: str, kind: str = "info", client: int | None = None) -> "State":
+        """With one more sentence for the user."""
+        number = self.notices[-1].number + 1 if self.notices else 0
+        return replace(self, notices=(*self.notices[-20:], Notice(number, text, kind, client)))
+
+    def changed(self, label: str, session: Session) -> "State":
+        """With a change of the settings that can be undone. A change to what is already there is none."""
+        before = Settings.of(self.session)
+        if before == Settings.of(session):
+            return replace(self, session=session)
+        return replace(self, session=session, undo=(*self.undo, Change(label, before))[-MAX_UNDO:], redo=())
+
+
+def opened(library: Library, session: Session, path: Path | None, before: State | None = None) -> State:
+    """The state in which a session was just opened. Raises BadInput when its robot is unknown."""
+    robot = library.robot(session.workcell.robot)
+    state = State(library, session, robot, saved=session if path else None, path=path)
+    if before is None:
+        return state
+    return replace(state, jobs=before.jobs, notices=before.notices, viewers=before.viewers, speed=before.speed, loads=before.loads + 1)
+
+
+def undone(state: State) -> State:
+    """The last change taken back."""
+    if not state.undo:
+        return state
+    change = state.undo[-1]
+    forward = Change(change.label, Settings.of(state.session))
+    return replace(state, session=change.before.put_into(state.session), undo=state.undo[:-1], redo=(*state.redo, forward))
+
+
+def redone(state: State) -> State:
+    """The change that was last taken back, made again."""
+    if not state.redo:
+        return state
+    change = state.redo[-1]
+    back = Change(change.label, Settings.of(state.session))
+    return replace(state, session=change.before.put_into(state.session), undo=(*state.undo, back), redo=state.redo[:-1])
+
+
+@lru_cache(maxsize=4)
+def _replay(robot: Robot, plan) -> Replay:
+    return Replay(robot, plan)
+
+
+def _kept(session: Session) -> tuple:
+    """What makes a session worth saving. Arrays are compared by identity: they never change."""
+    return session.name, id(session.workcell), session.commands, session.seed, id(session.scene), tuple(map(id, session.results))

@@ -1,0 +1,72 @@
+"""Everything on screen, made once; `render` then draws the difference between two states."""
+
+from typing import Any, Protocol
+
+import viser
+
+from handey_studio.app import palette
+from handey_studio.app.panels.findings import GraspPanel, ResultPanel
+from handey_studio.app.panels.ledger import LedgerPanel
+from handey_studio.app.panels.looking import LookingPanel
+from handey_studio.app.panels.move import MovePanel
+from handey_studio.app.panels.session import SessionPanel
+from handey_studio.app.panels.timeline import TimelinePanel
+from handey_studio.app.scene.depth import DepthScene
+from handey_studio.app.scene.destination import DestinationScene
+from handey_studio.app.scene.findings import PlanScene
+from handey_studio.app.scene.parts import PartsScene
+from handey_studio.app.scene.robot import RobotScene
+from handey_studio.app.scene.workcell import WorkcellScene
+from handey_studio.app.shortcuts import add_shortcuts
+from handey_studio.app.state import State
+from handey_studio.app.wire import Send
+
+LEFT_WIDTH, RIGHT_WIDTH = 318, 348
+
+
+class Pane(Protocol):
+    """A piece of the screen."""
+
+    def render(self, old: State | None, new: State) -> None: ...
+
+
+class View:
+    """All panes."""
+
+    def __init__(self, server: viser.ViserServer, send: Send) -> None:
+        self._server = server
+        server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
+        scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server)]
+        scenes += [DestinationScene(server, send), PlanScene(server)]
+        session = SessionPanel(server, send)
+        self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(RIGHT_WIDTH)
+        add_shortcuts(server.gui, send, session)
+
+    def render(self, old: State | None, new: State) -> None:
+        with self._server.atomic():
+            for pane in self._panes:
+                pane.render(old, new)
+
+
+def _left(gui: viser.GuiApi, send: Send) -> list[Any]:
+    panel = gui.add_panel()
+    with panel.add_tab("Move", viser.Icon.ROBOT):
+        move = MovePanel(gui, send)
+    with panel.add_tab("View", viser.Icon.EYE):
+        looking = LookingPanel(gui, send)
+    panel.dock_left()
+    panel.set_width(LEFT_WIDTH)
+    return [move, looking]
+
+
+def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
+    tabs = gui.add_tab_group()
+    with tabs.add_tab("Result"):
+        result = ResultPanel(gui)
+    with tabs.add_tab("Grasp"):
+        grasp = GraspPanel(gui)
+    with tabs.add_tab("Ledger"):
+        ledger = LedgerPanel(gui, send)
+    return [result, grasp, ledger]

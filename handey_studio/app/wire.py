@@ -1,0 +1,71 @@
+"""Widgets to commands and back, with the few hooks into viser that are not public kept in one place."""
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import viser
+from viser import _messages
+
+log = logging.getLogger(__name__)
+
+Send = Callable[[Any], None]
+
+
+def on_user(handle: Any, send: Send, make: Callable[[Any], Any]) -> None:
+    """Send `make(event)` when a user (not this program) changes the widget. Handlers run in order, and only enqueue."""
+
+    async def changed(event: Any) -> None:
+        if event.client is not None:
+            command = make(event)
+            if command is not None:
+                send(command)
+
+    handle.on_update(changed)
+
+
+def on_click(handle: Any, send: Send, make: Callable[[Any], Any]) -> None:
+    """Send `make(event)` when a button is pressed."""
+
+    async def pressed(event: Any) -> None:
+        command = make(event)
+        if command is not None:
+            send(command)
+
+    handle.on_click(pressed)
+
+
+def on_upload(handle: Any, send: Send, make: Callable[[Any], Any]) -> None:
+    """Send `make(event)` when a file has arrived."""
+
+    async def arrived(event: Any) -> None:
+        send(make(event))
+
+    handle.on_upload(arrived)
+
+
+def on_trigger(command: Any, send: Send, make: Callable[[Any], Any]) -> None:
+    """Send `make(event)` when a keyboard command fires."""
+
+    async def fired(event: Any) -> None:
+        made = make(event)
+        if made is not None:
+            send(made)
+
+    command.on_trigger(fired)
+
+
+def set_to(handle: Any, **properties: Any) -> None:
+    """Assign only what differs, so that nothing is sent for nothing."""
+    for key, value in properties.items():
+        if getattr(handle, key) != value:
+            setattr(handle, key, value)
+
+
+def close_share_tunnel(server: viser.ViserServer) -> None:
+    """No browser may ask this program to open itself to the internet: the handler goes, not just its button."""
+    websock = getattr(server, "_websock_server", None)
+    if websock is None or not hasattr(websock, "unregister_handler"):
+        log.warning("this version of viser has no share handler to close")
+        return
+    websock.unregister_handler(_messages.ShareUrlRequest)

@@ -1,0 +1,63 @@
+"""One MOVE of a session, from the scan to the executed plan: what the workbench's planner process runs."""
+
+from dataclasses import replace
+from typing import Protocol
+
+from handey_studio.base import BadInput, Progress
+from handey_studio.cell.protocol import CannotAct
+from handey_studio.cell.simulated import SimulatedCell
+from handey_studio.cell.workcell import SimulatedSetup
+from handey_studio.session.session import Session
+from handey_studio.task import MoveOptions, MoveResult, Station, check_command, execute_in, plan_in, sense
+from handey_studio.task.run import Share
+from handey_studio.world import Library
+
+
+class ShowingProgress(Progress, Protocol):
+    """Progress that can also show what was found so far."""
+
+    def show(self, session: Session) -> None: ...
+
+
+def run_session(session: Session, library: Library, execute: bool, progress: ShowingProgress) -> Session:
+    """Sense, plan and, if asked, execute the session's last MOVE in its cell; the session with all that was found.
+
+    Nothing found is a result in the session, not an exception. Raises BadInput for a command that means nothing here.
+    """
+    if not session.commands:
+        raise BadInput(f'session "{session.name}" has no MOVE; choose a part and a destination.')
+    command, station = session.commands[-1], station_of(session, library)
+    check_command(command, station.models)
+    cell = cell_of(session, library)
+    try:
+        scene = sense(station, cell, session.seed, Share(progress, 0.0, 0.25))
+    except CannotAct as error:
+        return replace(session, scene=None, results=(MoveResult(command, "failed", str(error)),))
+    session = replace(session, scene=scene, results=())
+    progress.show(session)
+    options = MoveOptions(seed=session.seed)
+    result = plan_in(station, scene, command, cell.joints(), cell.opening(), options, Share(progress, 0.25, 0.9))
+    session = replace(session, results=(result,))
+    if not execute or result.plan is None or progress.cancelled:
+        return session
+    progress.show(session)
+    result = execute_in(station, scene, result, cell, Share(progress, 0.9, 1.0))
+    return replace(session, results=(result,), cell_now=setup_of(session, cell))
+
+
+def station_of(session: Session, library: Library) -> Station:
+    """The session's workcell with its robot and its own part models."""
+    return Station(session.workcell, library.robot(session.workcell.robot), session.parts)
+
+
+def cell_of(session: Session, library: Library) -> SimulatedCell:
+    """The simulated cell as the session's last execution left it."""
+    workcell = session.workcell
+    return SimulatedCell(workcell if session.cell_now is None else replace(workcell, setup=session.cell_now), library)
+
+
+def setup_of(session: Session, cell: SimulatedCell) -> SimulatedSetup:
+    """Where the cell's bodies stand now. It is kept so that the next MOVE finds the cell as it was left; no planner reads it."""
+    before = session.cell_now or session.workcell.setup
+    bodies = tuple(replace(body, T_world_body=cell.true_pose(body.name)) for body in before.bodies)
+    return SimulatedSetup(bodies, drop=False, seed=before.seed)
