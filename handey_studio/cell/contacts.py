@@ -82,46 +82,53 @@ def true_scene(robot: Robot, bodies: Sequence[SolidBody], names: dict[str, str])
 
 @dataclass(frozen=True)
 class _Mover:
-    """A shape that moves with a link, and its poses (k, 4, 4)."""
+    """A shape that moves with a link: its poses (k, 4, 4), and the axis-aligned boxes around it, corners (k, 3)."""
 
     shape: Shape
     link: int
     poses: NDArray
+    low: NDArray
+    high: NDArray
+
+
+def _mover(shape: Shape, link: int, poses: NDArray) -> _Mover:
+    return _Mover(shape, link, poses, *shape.extents(poses))
 
 
 def contacts(scene: Scene, arm: Arm, sampled: Sampled, allowed: frozenset[frozenset[str]], depths: Depths) -> list[Contact]:
     """All pairs that meet deeper than they may, each at its deepest. Neighbouring links are not looked at, nor what stands still."""
     found = []
-    for a, poses_a, b, poses_b, instants in _pairs(scene, arm, sampled):
-        may = frozenset((a.name, b.name)) in allowed
+    for a, b, instants in _pairs(scene, arm, sampled):
+        names = (a.shape.name, b.shape.name)
+        may = frozenset(names) in allowed
         limit = depths.allowed_depth if may else depths.free_depth
         worst, when = limit, -1
         for k in instants:
-            deep = depth(a, poses_a[k], b, poses_b[k])
+            deep = depth(a.shape, a.poses[k], b.shape, b.poses[k])
             if deep > worst:
                 worst, when = deep, int(k)
         if when >= 0:
-            found.append(Contact((a.name, b.name), float(sampled.time[when]), worst, limit, may))
+            found.append(Contact(names, float(sampled.time[when]), worst, limit, may))
     return found
 
 
-def _pairs(scene: Scene, arm: Arm, sampled: Sampled) -> Iterator[tuple[Shape, NDArray, Shape, NDArray, NDArray]]:
-    """Pairs of shapes with their poses, and the instants at which their bounding boxes meet."""
+def _pairs(scene: Scene, arm: Arm, sampled: Sampled) -> Iterator[tuple[_Mover, _Mover, NDArray]]:
+    """Pairs of shapes, and the instants at which they may meet."""
     movers = _movers(scene, arm, sampled)
+    in_hand = scene.shapes[scene.held.name] if scene.held is not None else None
     for i, a in enumerate(movers):
         for b in movers[i + 1 :]:
             if abs(a.link - b.link) > 1:
-                yield a.shape, a.poses, b.shape, b.poses, _near(a.shape, a.poses, b.shape, b.poses)
-            elif a.link == b.link == arm.n + 1 and scene.held is not None and b.shape is scene.shapes[scene.held.name]:
+                yield a, b, _near(a, b)
+            elif a.link == b.link and b.shape is in_hand:
                 # In the hand only the fingers' opening changes where they meet the held body.
-                _, first = np.unique(sampled.opening, return_index=True)
-                yield a.shape, a.poses, b.shape, b.poses, first
+                yield a, b, np.unique(sampled.opening, return_index=True)[1]
     for body in scene.bodies:
-        shape = scene.shapes[body.name]
-        poses = np.broadcast_to(body.T_world_body, (len(sampled.time), 4, 4))
+        standing = _mover(scene.shapes[body.name], 0, body.T_world_body[None])
+        standing = replace(standing, poses=np.broadcast_to(body.T_world_body, (len(sampled.time), 4, 4)))
         for a in movers:
             if a.link > 0:
-                yield a.shape, a.poses, shape, poses, _near(a.shape, a.poses, shape, poses)
+                yield a, standing, _near(a, standing)
 
 
 def _movers(scene: Scene, arm: Arm, sampled: Sampled) -> list[_Mover]:
@@ -133,13 +140,12 @@ def _movers(scene: Scene, arm: Arm, sampled: Sampled) -> list[_Mover]:
         if shape.name in FINGER_SIDES:
             shifts = np.array([transform(None, (FINGER_SIDES[shape.name] * opening, 0.0, 0.0)) for opening in sampled.opening])
             poses = poses @ shifts
-        movers.append(_Mover(shape, link, poses))
+        movers.append(_mover(shape, link, poses))
     if scene.held is not None and scene.T_hand_body is not None:
-        movers.append(_Mover(scene.shapes[scene.held.name], arm.n + 1, T_hand @ scene.T_hand_body))
+        movers.append(_mover(scene.shapes[scene.held.name], arm.n + 1, T_hand @ scene.T_hand_body))
     return movers
 
 
-def _near(a: Shape, poses_a: NDArray, b: Shape, poses_b: NDArray) -> NDArray:
-    low_a, high_a = a.extents(poses_a)
-    low_b, high_b = b.extents(poses_b)
-    return np.nonzero(((low_a <= high_b) & (low_b <= high_a)).all(axis=1))[0]
+def _near(a: _Mover, b: _Mover) -> NDArray:
+    """The instants at which the boxes around two shapes meet."""
+    return np.nonzero(((a.low <= b.high) & (b.low <= a.high)).all(axis=1))[0]

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 from handey_studio.base import Value, frozen_array
 from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.penetration import Polytope, overlap, polytope, polytopes_of
-from handey_studio.geometry.transforms import apply, inverse
+from handey_studio.geometry.transforms import inverse
 from handey_studio.world.arm import LinkBody
 
 fcl: Any = import_module("fcl")  # compiled, without type information
@@ -41,9 +41,8 @@ class Shape(Value):
 
     @cached_property
     def bounds(self) -> NDArray:
-        """The eight corners (8, 3) of the box around it in its own frame."""
-        ends = np.stack([self.corners.min(axis=0), self.corners.max(axis=0)])
-        return np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+        """Lower and upper corner (2, 3) of the box around it in its own frame."""
+        return np.stack([self.corners.min(axis=0), self.corners.max(axis=0)])
 
     @cached_property
     def tree(self) -> Any:
@@ -56,8 +55,10 @@ class Shape(Value):
 
     def extents(self, poses: NDArray) -> tuple[NDArray, NDArray]:
         """Lower and upper corners (k, 3) of the axis-aligned boxes around it at poses (k, 4, 4)."""
-        moved = np.einsum("kij,cj->kci", poses[:, :3, :3], self.bounds) + poses[:, None, :3, 3]
-        return moved.min(axis=1), moved.max(axis=1)
+        middle, half = self.bounds.mean(axis=0), np.ptp(self.bounds, axis=0) / 2
+        centres = poses[:, :3, :3] @ middle + poses[:, :3, 3]
+        reach = np.abs(poses[:, :3, :3]) @ half
+        return centres - reach, centres + reach
 
     def holds(self, point: NDArray) -> bool:
         """Whether a point (3,) of its frame is inside, by the solid angle that the surface spans around it."""
@@ -101,8 +102,7 @@ def depth(a: Shape, T_world_a: NDArray, b: Shape, T_world_b: NDArray) -> float:
 def _inside(inner: Shape, T_world_inner: NDArray, outer: Shape, T_world_outer: NDArray) -> bool:
     """Whether one shape lies wholly in another, when their surfaces do not meet."""
     T = inverse(T_world_outer) @ T_world_inner
-    corners = apply(T, inner.bounds)
-    middle = corners.mean(axis=0)
-    if (middle < outer.bounds[0]).any() or (middle > outer.bounds[-1]).any():
+    spot = T[:3, :3] @ inner.corners[0] + T[:3, 3]
+    if (spot < outer.bounds[0]).any() or (spot > outer.bounds[1]).any():
         return False
-    return outer.holds(apply(T, inner.corners[0]))
+    return outer.holds(spot)
