@@ -18,7 +18,7 @@ from handey_studio.localization.pairs import data_lines, data_pairs, model_edges
 from handey_studio.localization.refine import refine, weights_of
 from handey_studio.localization.render import rendered_depth
 from handey_studio.localization.result import Hypothesis, LocatedPose, LocateOptions, LocateResult, pose_matrix
-from handey_studio.localization.samples import part_samples
+from handey_studio.localization.samples import DENSER, part_samples
 from handey_studio.localization.segments import DataEdge, data_edges, link
 from handey_studio.localization.surface import surface_of
 from handey_studio.localization.verify import Verdict, edge_tally, verify
@@ -168,6 +168,8 @@ def _accept(search: _Search, candidates: list[_Candidate]) -> tuple[list[Located
         for verdict, candidate in judged:
             fall = _objection(search, candidate, verdict, accepted)
             if fall is None and not taken_one:
+                candidate = _polished(search, candidate)
+                verdict = _judge(search, candidate)
                 accepted.append(_located(search, candidate, verdict))
                 _take(search, candidate)
                 taken_one = True
@@ -181,6 +183,14 @@ def _accept(search: _Search, candidates: list[_Candidate]) -> tuple[list[Located
     search.timing["accept"] = time.perf_counter() - start
     shown.sort(key=lambda pair: (pair[1].reason is not None, -pair[0]))
     return accepted, [hypothesis for _, hypothesis in shown]
+
+
+def _polished(search: _Search, candidate: _Candidate) -> _Candidate:
+    """Refined once more, from many more readings."""
+    weights, limits = weights_of(search.view, search.pixel), limits_of(search.view)
+    samples = part_samples(candidate.part, DENSER)
+    R, t, margin, rms = refine(candidate.R[None], candidate.t[None], samples, search.evidence, limits, weights, 6)
+    return candidate._replace(R=R[0], t=t[0], margin=float(margin[0]), rms=float(rms[0]))
 
 
 def _judge(search: _Search, candidate: _Candidate) -> Verdict:

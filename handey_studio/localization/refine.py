@@ -100,8 +100,8 @@ def _outlines(R, t, margin, samples, evidence, limits, sigma, A, g):
         length = np.sqrt(mx * mx + my * my + mz * mz)
         if length < 0.2:
             continue
-        left = facing(R, samples.left[k], x, y, z, evidence.camera) > 0
-        right = facing(R, samples.right[k], x, y, z, evidence.camera) > 0
+        left = facing(R, samples.left[k], x, y, z, evidence.camera) > GRAZING
+        right = facing(R, samples.right[k], x, y, z, evidence.camera) > GRAZING
         into = samples.into_left[k] if left else samples.into_right[k]
         outwards = -(mx * _dot(R, 0, into) + my * _dot(R, 1, into) + mz * _dot(R, 2, into))
         sign = (1.0 if outwards > 0 else -1.0) / length
