@@ -13,6 +13,7 @@ from handey_studio.app.state import State, opened
 from handey_studio.base import BadInput
 from handey_studio.session import (
     Session,
+    ViewState,
     check_name,
     find_session,
     own_file,
@@ -161,19 +162,21 @@ class LookFrom:
 
 def viewpoint(view: str, state: State) -> tuple[NDArray, NDArray]:
     """Camera position and point to look at (3,) [m] of a named view."""
-    finder = state.session.workcell.finder
+    finder, replay = state.session.workcell.finder, state.replay
     middle = finder.T_world_range[:3, 3] + finder.T_world_range[:3, :3] @ (finder.area[0] / 2, finder.area[1] / 2, 0.0)
     if view == "Top":
-        return middle + (-0.001, 0.0, 0.85), middle
-    if view == "Pile":
-        return middle + (0.38, -0.42, 0.36), middle + (0.0, 0.0, 0.03)
-    if view == "Grasp" and state.replay is not None:
-        at = state.replay.plan.T_world_part_start[:3, 3]
-        return at + (0.22, -0.26, 0.20), at + (0.0, 0.0, 0.03)
-    if view == "Hand" and state.replay is not None:
-        at = state.replay.at(state.session.view.time_s).T_world_part[:3, 3]
-        return at + (0.30, -0.34, 0.26), at
-    return np.array([1.42, -1.02, 0.92]), np.array([0.26, -0.02, 0.20])
+        return _seen_from(middle, (-0.001, 0.0, 0.85))
+    if view == "Grasp" and replay is not None:
+        return _seen_from(replay.plan.T_world_part_start[:3, 3], (0.22, -0.26, 0.20))
+    if view == "Hand" and replay is not None:
+        return _seen_from(replay.at(state.session.view.time_s).T_world_part[:3, 3], (0.30, -0.34, 0.26))
+    if view == "Workcell":
+        return ViewState().camera_position, ViewState().camera_look_at
+    return _seen_from(middle, (0.42, -0.46, 0.40))
+
+
+def _seen_from(point: NDArray, offset: tuple[float, float, float]) -> tuple[NDArray, NDArray]:
+    return point + np.array(offset), point
 
 
 def _saved(state: State, session: Session, path: Path) -> State:

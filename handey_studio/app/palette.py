@@ -1,5 +1,7 @@
 """Colours with fixed meanings, chosen to be told apart without red and green: blue, orange, grey."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,7 @@ ARM_LIGHT: RGB = (222, 227, 233)
 ARM_DARK: RGB = (92, 107, 124)
 HAND: RGB = (58, 68, 80)
 FINGER: RGB = (36, 44, 54)
-TABLE: RGB = (238, 236, 231)
+TABLE: RGB = (226, 224, 219)
 FLOOR: RGB = (226, 230, 235)
 BLOCK: RGB = (168, 176, 186)
 
@@ -35,14 +37,24 @@ STEP_COLOURS: dict[str, RGB] = {
 
 # Elevation: from the table's blue grey over slate blue to a warm light yellow; lightness rises all the way, so it reads in grey too.
 ELEVATION = np.array(
-    [[196, 206, 217], [72, 100, 143], [61, 119, 160], [86, 150, 158], [146, 176, 134], [206, 194, 104], [252, 222, 112]], float
+    [
+        [198, 208, 219],
+        [190, 202, 216],
+        [70, 96, 142],
+        [58, 120, 164],
+        [84, 152, 160],
+        [148, 178, 132],
+        [210, 196, 100],
+        [254, 224, 110],
+    ],
+    dtype=float,
 )
-ELEVATION_AT = np.array([0.0, 0.05, 0.25, 0.45, 0.65, 0.82, 1.0])
+ELEVATION_AT = np.array([0.0, 0.04, 0.10, 0.30, 0.48, 0.66, 0.84, 1.0])
 
 
-def css(colour: RGB) -> str:
+def css(colour: Sequence[float]) -> str:
     """`#rrggbb`."""
-    return "#{:02x}{:02x}{:02x}".format(*colour)
+    return "#{:02x}{:02x}{:02x}".format(*(int(c) for c in colour))
 
 
 def elevation_colours(share: NDArray) -> NDArray:

@@ -1,5 +1,7 @@
 """Keyboard commands; the palette (Ctrl+K) lists them all. W A S D Q E and the arrows belong to the browser's camera."""
 
+from typing import Any
+
 import viser
 
 from handey_studio.app.actions import CancelMove, LookFrom, SaveSession, StartMove
@@ -7,7 +9,7 @@ from handey_studio.app.commands import Redo, SeekStep, TogglePlay, Undo
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.wire import Send, on_trigger
 
-KEYS = (
+KEYS: tuple[tuple[str, Any, Any, Any], ...] = (
     ("Save the session", "S", "cmd/ctrl", SaveSession()),
     ("Undo", "Z", "cmd/ctrl", Undo()),
     ("Redo", "Z", "cmd/ctrl+shift", Redo()),
@@ -20,7 +22,7 @@ KEYS = (
     ("MOVE", "M", None, StartMove(execute=True)),
     ("Cancel planning", "escape", None, CancelMove()),
 )
-VIEW_KEYS = (("1", "Workcell"), ("2", "Pile"), ("3", "Top"), ("4", "Grasp"), ("5", "Hand"))
+VIEW_KEYS: tuple[tuple[Any, str], ...] = (("1", "Workcell"), ("2", "Pile"), ("3", "Top"), ("4", "Grasp"), ("5", "Hand"))
 
 
 def add_shortcuts(gui: viser.GuiApi, send: Send, session: SessionPanel) -> None:

@@ -29,10 +29,9 @@ def grasp_plane_svg(run: BumpRun, hand: Hand) -> str:
     ]
     goal = frame.pixels(run.goal[None])[0]
     parts.append(f'<circle cx="{goal[0]:.1f}" cy="{goal[1]:.1f}" r="4" fill="{css(palette.VERMILLION)}"/>')
-    return (
-        f'<svg data-testid="grasp-plane" viewBox="0 0 {SIZE} {SIZE}" style="width:100%;display:block;background:#fbfcfd;border:1px solid #dde2e8;'
-        f'border-radius:6px" role="img" aria-label="Grasp plane">{"".join(parts)}</svg>'
-    )
+    style = "width:100%;display:block;background:#fbfcfd;border:1px solid #dde2e8;border-radius:6px"
+    head = f'<svg data-testid="grasp-plane" viewBox="0 0 {SIZE} {SIZE}" style="{style}" role="img" aria-label="Grasp plane">'
+    return f"{head}{''.join(parts)}</svg>"
 
 
 def grasp_plane_html(run: BumpRun, hand: Hand) -> str:

@@ -9,6 +9,7 @@ from handey_studio.app.panels.findings import GraspPanel, ResultPanel
 from handey_studio.app.panels.ledger import LedgerPanel
 from handey_studio.app.panels.looking import LookingPanel
 from handey_studio.app.panels.move import MovePanel
+from handey_studio.app.panels.sensing import SensingPanel
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.panels.timeline import TimelinePanel
 from handey_studio.app.scene.depth import DepthScene
@@ -16,6 +17,7 @@ from handey_studio.app.scene.destination import DestinationScene
 from handey_studio.app.scene.findings import PlanScene
 from handey_studio.app.scene.parts import PartsScene
 from handey_studio.app.scene.robot import RobotScene
+from handey_studio.app.scene.sensing import SensingScene
 from handey_studio.app.scene.workcell import WorkcellScene
 from handey_studio.app.shortcuts import add_shortcuts
 from handey_studio.app.state import State
@@ -37,7 +39,7 @@ class View:
         self._server = server
         server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
         scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server)]
-        scenes += [DestinationScene(server, send), PlanScene(server)]
+        scenes += [DestinationScene(server, send), SensingScene(server), PlanScene(server)]
         session = SessionPanel(server, send)
         self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()
@@ -65,8 +67,10 @@ def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
     tabs = gui.add_tab_group()
     with tabs.add_tab("Result"):
         result = ResultPanel(gui)
+    with tabs.add_tab("Located"):
+        located = SensingPanel(gui, send)
     with tabs.add_tab("Grasp"):
         grasp = GraspPanel(gui)
     with tabs.add_tab("Ledger"):
         ledger = LedgerPanel(gui, send)
-    return [result, grasp, ledger]
+    return [result, located, grasp, ledger]

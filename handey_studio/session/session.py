@@ -22,8 +22,8 @@ class ViewState(Value):
     `hypothesis` and `edge` count into what was sensed, -1 for none; `result` counts the session's results, -1 for the last.
     """
 
-    camera_position: NDArray = field(default_factory=lambda: np.array([1.55, -0.95, 0.95]))
-    camera_look_at: NDArray = field(default_factory=lambda: np.array([0.30, 0.0, 0.15]))
+    camera_position: NDArray = field(default_factory=lambda: np.array([1.85, -1.30, 1.15]))
+    camera_look_at: NDArray = field(default_factory=lambda: np.array([0.27, 0.02, 0.20]))
     time_s: float = 0.0
     hypothesis: int = -1
     edge: int = -1

@@ -1,6 +1,7 @@
 """The ledger as a list: what was tried, and why each candidate fell."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import viser
 
@@ -20,7 +21,7 @@ class LedgerPanel:
     """Counts of reasons first, then the entries by stage."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
-        self._stage = gui.add_dropdown("Stage", (ALL_STAGES,))
+        self._stage: Any = gui.add_dropdown("Stage", (ALL_STAGES,))
         self._only = gui.add_dropdown("Entries", ONLY)
         self._words = gui.add_text("Find", "")
         self._list = gui.add_html("")
@@ -71,10 +72,12 @@ def ledger_html(entries: Sequence[Entry], total: int) -> str:
 
 def _count_row(reason: str, count: int, most: int) -> str:
     width = max(3.0, 100.0 * count / most)
+    clipped = "flex:0 0 62%;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
+    bar = f'<div style="width:{width:.0f}%;background:{css(palette.VERMILLION)};height:8px;border-radius:3px"></div>'
     return (
-        f'<div style="display:flex;align-items:center;gap:8px;margin:2px 0"><div style="flex:0 0 62%;overflow:hidden;text-overflow:ellipsis;'
-        f'white-space:nowrap" title="{html.esc(reason)}">{html.esc(reason)}</div><div style="flex:1;background:#e6eaef;border-radius:3px">'
-        f'<div style="width:{width:.0f}%;background:{css(palette.VERMILLION)};height:8px;border-radius:3px"></div></div>'
+        '<div style="display:flex;align-items:center;gap:8px;margin:2px 0">'
+        f'<div style="{clipped}" title="{html.esc(reason)}">{html.esc(reason)}</div>'
+        f'<div style="flex:1;background:#e6eaef;border-radius:3px">{bar}</div>'
         f'<div style="flex:0 0 34px;text-align:right;font-variant-numeric:tabular-nums">{count}</div></div>'
     )
 
@@ -94,7 +97,8 @@ def _row(entry: Entry) -> str:
     fell = entry.reason is not None
     mark = f'<span style="color:{css(palette.VERMILLION)}">✕</span>' if fell else f'<span style="color:{css(palette.TEAL)}">●</span>'
     why = f'<div style="color:#6b7684;padding-left:18px">{html.esc(_reason(entry))}</div>' if fell else ""
-    return f'<div style="padding:2px 0;border-bottom:1px solid #eef1f4"><span style="display:inline-block;width:18px">{mark}</span>{html.esc(entry.option)}{why}</div>'
+    option = f'<span style="display:inline-block;width:18px">{mark}</span>{html.esc(entry.option)}'
+    return f'<div style="padding:2px 0;border-bottom:1px solid #eef1f4">{option}{why}</div>'
 
 
 def _reason(entry: Entry) -> str:

@@ -40,9 +40,7 @@ class LookingPanel:
 def legend(state: State) -> str:
     """The elevation scale, when there is a scan, and the meaning of colours."""
     scan = state.session.scan
-    stops = ", ".join(
-        f"{palette.css(tuple(int(c) for c in colour))} {100 * at:.0f}%" for colour, at in zip(ELEVATION, ELEVATION_AT, strict=True)
-    )
+    stops = ", ".join(f"{palette.css(colour)} {100 * at:.0f}%" for colour, at in zip(ELEVATION, ELEVATION_AT, strict=True))
     bar = ""
     if scan is not None:
         span = 1e3 * elevation_span(scan)

@@ -29,7 +29,7 @@ class MovePanel:
         self._xyz = gui.add_vector3("Position (mm)", (0.0, 0.0, 0.0), step=1.0)
         self._rpy = gui.add_vector3("Turn (deg)", (0.0, 0.0, 0.0), step=1.0, hint="Roll, pitch and yaw about the part's origin")
         self._why = gui.add_html("")
-        self._plan = gui.add_button("Plan", icon=viser.Icon.ROUTE, hint="Sense and plan, then look at it; nothing moves")
+        self._plan = gui.add_button("Plan", icon=viser.Icon.ROUTE, color=palette.ARM_DARK, hint="Sense and plan; nothing moves")
         self._move = gui.add_button("MOVE", icon=viser.Icon.PLAYER_PLAY_FILLED, color=palette.BLUE, hint="Sense, plan and carry it out")
         self._cancel = gui.add_button("Cancel", icon=viser.Icon.PLAYER_STOP, color=palette.VERMILLION, visible=False)
         self._bar = gui.add_progress_bar(0.0, animated=True, color=palette.BLUE, visible=False)

@@ -9,7 +9,7 @@ from handey_studio.app.actions import DownloadSession, NewSession, OpenSession, 
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_upload
 
-BUTTONS = ("New", "Open", "Save", "Save as")
+BUTTONS = ("New", "Open", "Save", "Save as", "Download")
 
 
 class SessionPanel:
@@ -20,12 +20,7 @@ class SessionPanel:
         self._server, self._send = server, send
         self._state: State | None = None
         self._about = gui.add_html("")
-        buttons = gui.add_button_group("Session", BUTTONS)
-        files = gui.add_button_group("File", ("Download",))
-        upload = gui.add_upload_button("Upload a session …", icon=viser.Icon.UPLOAD, mime_type=".handey,application/gzip,application/json")
-        on_click(buttons, send, self._pressed)
-        on_click(files, send, lambda event: DownloadSession(event.client_id))
-        on_upload(upload, send, lambda event: UploadSession(event.target.value.name, event.target.value.content))
+        on_click(gui.add_button_group("", BUTTONS), send, self._pressed)
 
     def _pressed(self, event: Any) -> Any:
         choice = event.target.value
@@ -33,7 +28,7 @@ class SessionPanel:
             self.ask_open(event.client)
         elif choice == "Save as":
             self.ask_name(event.client)
-        return {"New": NewSession(), "Save": SaveSession()}.get(choice)
+        return {"New": NewSession(), "Save": SaveSession(), "Download": DownloadSession(event.client_id)}.get(choice)
 
     def ask_open(self, client: viser.ClientHandle | None) -> None:
         """A dialog with the library's sessions."""
@@ -46,8 +41,10 @@ class SessionPanel:
                 client.gui.add_html(html.empty("The library has no sessions yet. Save this one, or upload a file."))
             choice = client.gui.add_dropdown("Name", names or ("–",), disabled=not names)
             confirm = client.gui.add_button("Open this session", icon=viser.Icon.FOLDER_OPEN, disabled=not names)
+            upload = client.gui.add_upload_button("Upload a file …", icon=viser.Icon.UPLOAD, mime_type=".handey")
             close = client.gui.add_button("Close", color="gray")
         self._close_with(modal, confirm, lambda: OpenSession(choice.value))
+        on_upload(upload, self._uploaded(modal), lambda event: UploadSession(event.target.value.name, event.target.value.content))
         self._close_with(modal, close, lambda: None)
 
     def ask_name(self, client: viser.ClientHandle | None) -> None:
@@ -61,6 +58,13 @@ class SessionPanel:
             close = client.gui.add_button("Close", color="gray")
         self._close_with(modal, confirm, lambda: SaveSessionAs(name.value))
         self._close_with(modal, close, lambda: None)
+
+    def _uploaded(self, modal: Any) -> Send:
+        def send(command: Any) -> None:
+            modal.close()
+            self._send(command)
+
+        return send
 
     def _close_with(self, modal: Any, button: Any, make: Any) -> None:
         def pressed(_: Any) -> Any:

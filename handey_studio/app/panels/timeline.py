@@ -11,8 +11,8 @@ from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
 from handey_studio.session import Replay
 
-BACK, PLAY, PAUSE, ON = "◀ step", "Play", "Pause", "step ▶"
-SPEEDS = {"¼×": 0.25, "½×": 0.5, "1×": 1.0, "2×": 2.0, "4×": 4.0}
+FIRST, BACK, PLAY, ON, LAST = "|◀", "◀ Step", "Play / Pause", "Step ▶", "▶|"
+SPEEDS = {"½×": 0.5, "1×": 1.0, "3×": 3.0}
 WIDTH = 640
 
 
@@ -24,12 +24,10 @@ class TimelinePanel:
         with panel.add_tab("Timeline", viser.Icon.MOVIE):
             self._strip = gui.add_html("")
             self._slider = gui.add_slider("Time (s)", min=0.0, max=1.0, step=0.01, initial_value=0.0, disabled=True)
-            self._buttons = gui.add_button_group("Playing", ("|◀", BACK, "Play / Pause", ON, "▶|"))
-            self._speed = gui.add_button_group("Speed", tuple(SPEEDS))
+            self._buttons = gui.add_button_group("Play", (FIRST, BACK, PLAY, ON, LAST, *SPEEDS))
         panel.float(x=14, y=-14, width=WIDTH)
         on_user(self._slider, send, lambda event: Seek(float(event.target.value)))
         on_click(self._buttons, send, _pressed)
-        on_click(self._speed, send, lambda event: SetPlayback(speed=SPEEDS[event.target.value]))
 
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
@@ -63,17 +61,19 @@ def strip(replay: Replay, time_s: float, playing: bool, speed: float) -> str:
     step = replay.plan.steps[now]
     held = f", holding {step.held}" if step.held else ""
     words = f"{'▶' if playing else '❚❚'} {time_s:.2f} of {total:.2f} s · step {now + 1} of {len(replay.plan.steps)}: {step.kind}{held}"
+    bar = "position:relative;display:flex;height:22px;line-height:22px;color:#fff;font-size:11px"
+    line = "display:flex;justify-content:space-between;font-size:12px;margin-top:5px;font-variant-numeric:tabular-nums"
     return (
-        f'<div data-testid="timeline" style="margin:6px 14px 2px"><div style="position:relative;display:flex;height:22px;line-height:22px;'
-        f'color:#fff;font-size:11px;border-radius:4px">{"".join(boxes)}{cursor}</div><div style="display:flex;justify-content:space-between;'
-        f'font-size:12px;margin-top:5px;font-variant-numeric:tabular-nums"><span data-testid="step-name">{html.esc(words)}</span>'
-        f"<span>{speed:g}×</span></div></div>"
+        f'<div data-testid="timeline" style="margin:6px 14px 2px"><div style="{bar}">{"".join(boxes)}{cursor}</div>'
+        f'<div style="{line}"><span data-testid="step-name">{html.esc(words)}</span><span>{speed:g}×</span></div></div>'
     )
 
 
 def _pressed(event: Any) -> Any:
-    commands = {"|◀": SeekStep(-99), BACK: SeekStep(-1), ON: SeekStep(1), "▶|": SeekStep(99)}
-    return commands.get(event.target.value, TogglePlay())
+    value = event.target.value
+    if value in SPEEDS:
+        return SetPlayback(speed=SPEEDS[value])
+    return {FIRST: SeekStep(-99), BACK: SeekStep(-1), ON: SeekStep(1), LAST: SeekStep(99)}.get(value, TogglePlay())
 
 
 def _looks(state: State) -> tuple:

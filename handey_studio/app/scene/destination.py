@@ -1,6 +1,7 @@
 """The ghost of the part at its destination, moved by a gizmo; it snaps when it is let go."""
 
 from collections.abc import Callable
+from typing import Any
 
 import viser
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from handey_studio.app import palette
 from handey_studio.app.commands import Command, DropGhost
 from handey_studio.app.scene.parts import add_solid
-from handey_studio.app.scene.units import at, metres, place
+from handey_studio.app.scene.units import metres, place
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import transform
@@ -46,9 +47,8 @@ class DestinationScene:
 
     def _build(self, part, pose: NDArray) -> None:
         self._part = part
-        self._gizmo = self._server.scene.add_transform_controls(
-            GIZMO, scale=1.1, line_width=3.0, depth_test=False, opacity=0.85, **at(pose)
-        )
+        self._gizmo = self._server.scene.add_transform_controls(GIZMO, scale=1.1, line_width=3.0, depth_test=False, opacity=0.85)
+        place(self._gizmo, pose)
         add_solid(self._server.scene, f"{GIZMO}/ghost", part, palette.BLUE, transform(), opacity=0.38)
 
         @self._gizmo.on_update
@@ -76,7 +76,7 @@ def ghost_pose(state: State) -> NDArray | None:
         return None
 
 
-def _pose_of(gizmo) -> NDArray:
+def _pose_of(gizmo: Any) -> NDArray:
     return transform(Rotation.from_quat(gizmo.wxyz, scalar_first=True).as_matrix(), metres(gizmo.position))
 
 

@@ -5,7 +5,7 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import palette
-from handey_studio.app.scene.units import at, scaled
+from handey_studio.app.scene.units import place, scaled
 from handey_studio.app.state import State
 from handey_studio.session import Replay
 from handey_studio.task.plan import GraspChoice
@@ -58,7 +58,8 @@ def coloured_path(replay: Replay) -> tuple[NDArray, NDArray]:
 
 def add_grasp(scene: viser.SceneApi, grasp: GraspChoice, T_world_part: NDArray) -> viser.FrameHandle:
     """The outline where the fingers' faces face each other, and, thicker, the edge that is crossed first."""
-    frame = scene.add_frame(GRASP, show_axes=False, **at(T_world_part))
+    frame = scene.add_frame(GRASP, show_axes=False)
+    place(frame, T_world_part)
     if len(grasp.contact_part) > 1:
         loop = np.stack([grasp.contact_part, np.roll(grasp.contact_part, -1, axis=0)], axis=1)
         scene.add_line_segments(f"{GRASP}/contact", scaled(loop), colors=palette.TEAL, thickness=3.0, thickness_units="screen")

@@ -5,7 +5,7 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import palette
-from handey_studio.app.scene.units import at, place, scaled
+from handey_studio.app.scene.units import place, scaled
 from handey_studio.app.state import State
 from handey_studio.world import Part
 
@@ -13,16 +13,17 @@ ROOT = "/parts"
 
 
 def add_solid(
-    scene: viser.SceneApi, name: str, part: Part, colour: palette.RGB, T: NDArray, opacity: float | None = None, axes: bool = False
+    scene: viser.SceneApi, name: str, part: Part, colour: palette.RGB, T: NDArray, opacity: float | None = None
 ) -> viser.FrameHandle:
     """A frame at a pose with a part's faces and sharp edges below it."""
-    frame = scene.add_frame(name, show_axes=axes, axes_length=0.3, axes_radius=0.012, **at(T))
+    frame = scene.add_frame(name, show_axes=False)
+    place(frame, T)
     solid = part.solid
     corners = solid.vertices[solid.triangles].reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     scene.add_mesh_simple(f"{name}/faces", scaled(corners), faces, color=colour, opacity=opacity, side="double" if opacity else "front")
     edges = np.array([[solid.vertices[edge.start], solid.vertices[edge.end]] for edge in solid.edges])
-    dark = tuple(int(c * 0.55) for c in colour)
+    dark = (int(0.55 * colour[0]), int(0.55 * colour[1]), int(0.55 * colour[2]))
     scene.add_line_segments(f"{name}/edges", scaled(edges), colors=dark, thickness=1.5, thickness_units="screen")
     return frame
 

@@ -4,10 +4,11 @@ import numpy as np
 import viser
 
 from handey_studio.app import palette
-from handey_studio.app.scene.units import SCALE, at, scaled
+from handey_studio.app.scene.units import SCALE, place, scaled
 from handey_studio.app.state import State
 
-TABLE_M = (1.5, 1.5, 0.04)
+TABLE_M = (1.3, 1.3, 0.03)
+TABLE_AT_M = (0.25, 0.0)
 
 
 class WorkcellScene:
@@ -15,7 +16,7 @@ class WorkcellScene:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        self._blocks: list[viser.SceneNodeHandle] = []
+        self._blocks: list[viser.BoxHandle] = []
         _light(server)
 
     def render(self, old: State | None, new: State) -> None:
@@ -26,21 +27,21 @@ class WorkcellScene:
         _scan_outline(scene, workcell)
         for handle in self._blocks:
             handle.remove()
-        self._blocks = [
-            scene.add_box(
-                f"/workcell/blocks/{number}", color=palette.BLOCK, dimensions=tuple(block.size * SCALE), **at(block.T_world_block)
-            )
-            for number, block in enumerate(workcell.blocks)
-        ]
+        self._blocks = []
+        for number, block in enumerate(workcell.blocks):
+            x, y, z = (float(side) for side in block.size * SCALE)
+            handle = scene.add_box(f"/workcell/blocks/{number}", color=palette.BLOCK, dimensions=(x, y, z))
+            place(handle, block.T_world_block)
+            self._blocks.append(handle)
 
 
 def _light(server: viser.ViserServer) -> None:
     scene = server.scene
     scene.set_up_direction("+z")
     scene.configure_default_lights(enabled=False)
-    scene.add_light_hemisphere("/light/sky", sky_color=(255, 255, 255), ground_color=(196, 202, 210), intensity=1.6)
-    scene.add_light_directional("/light/key", color=(255, 250, 242), intensity=1.9, position=(9.0, -7.0, 16.0), cast_shadow=False)
-    scene.add_light_directional("/light/fill", color=(226, 236, 255), intensity=0.7, position=(-8.0, 9.0, 8.0), cast_shadow=False)
+    scene.add_light_hemisphere("/light/sky", sky_color=(255, 255, 255), ground_color=(196, 202, 210), intensity=1.15)
+    scene.add_light_directional("/light/key", color=(255, 250, 242), intensity=1.5, position=(9.0, -7.0, 16.0), cast_shadow=False)
+    scene.add_light_directional("/light/fill", color=(226, 236, 255), intensity=0.5, position=(-8.0, 9.0, 8.0), cast_shadow=False)
     scene.set_background_image(_backdrop(), format="png")
 
 
@@ -53,8 +54,9 @@ def _backdrop() -> np.ndarray:
 
 def _table(scene: viser.SceneApi, table_z: float) -> None:
     depth = TABLE_M[2] * SCALE
+    x, y = TABLE_AT_M[0] * SCALE, TABLE_AT_M[1] * SCALE
     size = (TABLE_M[0] * SCALE, TABLE_M[1] * SCALE, depth)
-    scene.add_box("/workcell/table", color=palette.TABLE, dimensions=size, position=(2.0, 0.0, table_z * SCALE - depth / 2 - 0.01))
+    scene.add_box("/workcell/table", color=palette.TABLE, dimensions=size, position=(x, y, table_z * SCALE - depth / 2 - 0.01))
     scene.add_grid(
         "/workcell/grid",
         width=size[0],
@@ -65,7 +67,7 @@ def _table(scene: viser.SceneApi, table_z: float) -> None:
         section_color=(204, 202, 196),
         cell_thickness=1.0,
         section_thickness=1.2,
-        position=(2.0, 0.0, table_z * SCALE),
+        position=(x, y, table_z * SCALE),
     )
 
 
