@@ -19,6 +19,7 @@ from handey_studio.world import Hand, World
 
 CELL_M = 0.002
 HALF_SIZE_M = 0.22  # the bounding rectangle reaches this far from the grasp point: the hand's whole length and its way in
+RAYS_OF_COLUMN = np.array([[0.0, 0.0], [-0.49, -0.49], [-0.49, 0.49], [0.49, -0.49], [0.49, 0.49]])  # a column is as wide as its cell
 RAY_BOTTOM_M = 0.01  # rays end this far below the table's top: the table fills the rest
 
 
@@ -69,16 +70,19 @@ def fill_grasp_plane(world: World, T_world_plane: NDArray, centre: NDArray, hand
 def _fill_slab(grid: NDArray, world: World, T_world_plane: NDArray, origin: NDArray, low: float, high: float) -> None:
     """Fill the cells of the slab low ≤ x ≤ high of the plane's frame."""
     if world.terrain is not None:
-        tops = _column_tops(world.terrain.coarsened(2), world.table_z, T_world_plane, low, high, len(grid))
-        down = inverse(T_world_plane)[:3, :3] @ np.array([0.0, 0.0, -1.0])
-        lengths = tops[:, 2] - (world.table_z - RAY_BOTTOM_M)
-        _fill_rays(grid, apply(inverse(T_world_plane), tops), lengths, down, origin, CELL_M, low, high)
+        terrain = world.terrain.coarsened(max(1, round(CELL_M / world.terrain.cell)))
+        tops = _column_tops(terrain, world.table_z, T_world_plane, low, high)
+        T_plane_world = inverse(T_world_plane)
+        lengths = np.tile(tops[:, 2] - (world.table_z - RAY_BOTTOM_M), len(RAYS_OF_COLUMN))
+        rays = np.concatenate([tops + terrain.T_world_range[:3, :2] @ offset for offset in RAYS_OF_COLUMN * terrain.cell])
+        down = -T_plane_world[:3, 2]
+        _fill_rays(grid, apply(T_plane_world, rays), lengths, np.ascontiguousarray(down), origin, CELL_M, low, high)
     planes, counts = _half_spaces(world, T_world_plane)
     samples = np.linspace(low, high, max(2, round((high - low) / (2 * CELL_M)) + 1))
     _fill_solids(grid, planes, counts, origin, CELL_M, samples)
 
 
-def _column_tops(terrain: HeightField, table_z: float, T_world_plane: NDArray, low: float, high: float, n: int) -> NDArray:
+def _column_tops(terrain: HeightField, table_z: float, T_world_plane: NDArray, low: float, high: float) -> NDArray:
     """Tops (k, 3) [m] of the columns that stand above the table and near the slab, in the world frame."""
     j, i = np.nonzero(terrain.top + terrain.T_world_range[2, 3] > table_z + 1e-3)
     tops = apply(terrain.T_world_range, np.c_[(i + 0.5) * terrain.cell, (j + 0.5) * terrain.cell, terrain.top[j, i]])
@@ -94,18 +98,18 @@ def _column_tops(terrain: HeightField, table_z: float, T_world_plane: NDArray, l
 def _fill_rays(
     grid: NDArray, starts: NDArray, lengths: NDArray, down: NDArray, origin: NDArray, cell: float, low: float, high: float
 ) -> None:
-    """Mark the cells that each downward ray crosses while it is inside the slab; rays are a column wide."""
+    """Mark the cells that each downward ray crosses while it is inside the slab."""
     n = len(grid)
     for r in range(len(starts)):
         t = 0.0
         while t <= lengths[r]:
             x = starts[r, 0] + t * down[0]
-            if x >= low - cell and x <= high + cell:
+            if x >= low - 0.5 * cell and x <= high + 0.5 * cell:
                 i = int(np.floor((starts[r, 1] + t * down[1] - origin[0]) / cell))
                 k = int(np.floor((starts[r, 2] + t * down[2] - origin[1]) / cell))
                 if 0 <= i < n and 0 <= k < n:
                     grid[i, k] = True
-            t += 0.5 * cell
+            t += 0.35 * cell
 
 
 @njit(cache=True)
