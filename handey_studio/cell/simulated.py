@@ -12,7 +12,7 @@ from handey_studio.cell.guarded import first_touch, motion_at
 from handey_studio.cell.physics import settle
 from handey_studio.cell.protocol import CannotAct, Motion, Moved
 from handey_studio.cell.stripes import photograph
-from handey_studio.cell.workcell import Workcell
+from handey_studio.cell.workcell import SimulatedSetup, Workcell
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.world.arm import arm_of
 from handey_studio.world.library import Library
@@ -108,6 +108,12 @@ class SimulatedCell:
     def held_truly(self) -> str | None:
         """Name of the true body in the hand, for benchmarks and checkers only."""
         return self._held.name if self._held else None
+
+    def setup_now(self) -> SimulatedSetup:
+        """The true state as a setup, so that a session can go on from it. What the hand holds is where the hand has it."""
+        now = {body.name: body.T_world_body for body in self._bodies}
+        bodies = tuple(replace(body, T_world_body=now[body.name]) for body in self._workcell.setup.bodies)
+        return replace(self._workcell.setup, bodies=bodies, drop=False)
 
     def _check(self, motion: Motion) -> None:
         q, times = motion.q_rad, motion.time_s
