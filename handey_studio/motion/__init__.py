@@ -1,6 +1,18 @@
 """Arm motion (Handey 1987 §4): slice configuration space, the three-leg path, its certificate, timing."""
 
 from handey_studio.motion.certificate import MARGIN_M, certify
+from handey_studio.motion.path import plan_path
+from handey_studio.motion.query import PathOptions
 from handey_studio.motion.results import Certificate, CSpaceSummary, Leg, PathResult, Trajectory
 
-__all__ = ["MARGIN_M", "CSpaceSummary", "Certificate", "Leg", "PathResult", "Trajectory", "certify"]
+__all__ = [
+    "MARGIN_M",
+    "CSpaceSummary",
+    "Certificate",
+    "Leg",
+    "PathOptions",
+    "PathResult",
+    "Trajectory",
+    "certify",
+    "plan_path",
+]

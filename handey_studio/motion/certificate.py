@@ -70,10 +70,14 @@ def certify(
         raise BadInput(f"a path must be finite angles (n ≥ 1, {len(world.robot.lower)}), this one has shape {path.shape}.")
     openings = np.broadcast_to(np.asarray(opening, dtype=float), len(path))
     mine = mover(world, float(openings[0]), held, allowed, margin)
-    return _certify(mine, path if len(path) > 1 else np.repeat(path, 2, axis=0), openings if len(path) > 1 else np.repeat(openings, 2))
+    return certify_with(mine, path, openings)
 
 
-def _certify(mine: Mover, path: NDArray, openings: NDArray) -> Certificate:
+def certify_with(mine: Mover, path: NDArray, openings: NDArray | None = None) -> Certificate:
+    """The certificate of a path (n, joints) [rad] by a mover; `openings` (n,) [m] are the mover's own unless given."""
+    openings = np.full(len(path), mine.opening) if openings is None else openings
+    if len(path) == 1:
+        path, openings = np.repeat(path, 2, axis=0), np.repeat(openings, 2)
     checks, least, at, bodies = 0, FAR_M, (0, 0.0), ()
     for k in range(len(path) - 1):
         pair = (float(openings[k]), float(openings[k + 1]))

@@ -49,7 +49,9 @@ def arm_spheres(robot: Robot, wrists: NDArray, opening: float, held: Held | None
     centres, radii, links = [], [], []
     for piece, (c, r) in _robot_balls(robot):
         if piece.link in LINK_BALLS_M:
-            centres.append(c), radii.append(r), links.append(np.full(len(r), piece.link))
+            centres.append(c)
+            radii.append(r)
+            links.append(np.full(len(r), piece.link))
     carried = [pair for pair in _robot_balls(robot) if pair[0].link > 3] + (list(_held_balls(robot, held)) if held else [])
     swept, corners = sweep(robot, carried, wrists, opening)
     for size in BALL_SIZES_M:
