@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from handey_studio.base import BadInput, Entry
+from handey_studio.base import BadInput, Entry, describe
 from handey_studio.base.files import replace_file
 from handey_studio.localization import LocateOptions, localize
 from handey_studio.localization.report import locate_report
@@ -19,7 +19,7 @@ from handey_studio.sensing.files import read_depth
 from handey_studio.sensing.support import support_plane
 from handey_studio.session import Session, find_session, read_session, write_session
 from handey_studio.session.run import cell_of, setup_of, station_of
-from handey_studio.task import MoveCommand, MoveOptions, MoveResult, describe, run_move
+from handey_studio.task import MoveCommand, MoveOptions, MoveResult, run_move
 from handey_studio.task.bench import bench_piles
 from handey_studio.task.report import move_report
 from handey_studio.world import Library

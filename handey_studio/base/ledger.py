@@ -4,6 +4,7 @@ Everyone in this field asks their planner "why not?". Every search writes an ent
 screen, the command line's JSON and the tests read these same entries.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -14,7 +15,8 @@ class Entry:
     """One option that was tried.
 
     `reason` says in a few words why it fell, and is None while nothing speaks against it. `value` is the number that
-    was measured and `limit` the number it was held against, both in `unit`. `bodies` names what collided, if anything.
+    was measured and `limit` the number it was held against, both in `unit`, which is SI (m, m², rad, s) or a share, a count or
+    nothing (`""`); people read it through `measured`. `bodies` names what collided, if anything.
     """
 
     id: int
@@ -78,3 +80,23 @@ class Ledger:
 def rejected_counts(entries: Iterable[Entry]) -> dict[str, int]:
     """How many options fell for each reason, most frequent first."""
     return dict(Counter(entry.reason for entry in entries if entry.reason is not None).most_common())
+
+
+SHOWN = {"m": (1e3, "mm"), "m²": (1e6, "mm²"), "rad": (180.0 / math.pi, "°")}
+
+
+def measured(value: float, unit: str) -> str:
+    """A number as people read it: metres as mm, square metres as mm², radians as degrees."""
+    factor, shown = SHOWN.get(unit, (1.0, unit))
+    return f"{value * factor:.4g} {shown}".rstrip()
+
+
+def describe(entry: Entry) -> str:
+    """An entry's reason with its bodies, its number and the limit, as it is read on screen; empty while nothing speaks against it."""
+    text = entry.reason or ""
+    if text and entry.bodies:
+        text += f" ({' and '.join(entry.bodies)})"
+    if text and entry.value is not None:
+        text += f": {measured(entry.value, entry.unit)}"
+        text += "" if entry.limit is None else f", limit {measured(entry.limit, entry.unit)}"
+    return text

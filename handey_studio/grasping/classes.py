@@ -99,16 +99,16 @@ def grasp_classes(part: Part, hand: Hand) -> tuple[tuple[GraspClass, ...], tuple
         width = float(solid.offsets[f] + solid.offsets[g])
         entry = ledger.add("grasp class", f"faces {f}–{g}")
         if width <= 0:
-            ledger.fall(entry, "the faces look at each other across a gap, not through the part", value=1e3 * width, limit=0.0, unit="mm")
+            ledger.fall(entry, "the faces look at each other across a gap, not through the part", value=width, limit=0.0, unit="m")
             continue
         if not hand.opening_min <= width <= hand.opening_max - 2 * OPEN_CLEARANCE_MIN_M:
             limit = hand.opening_min if width < hand.opening_min else hand.opening_max - 2 * OPEN_CLEARANCE_MIN_M
-            ledger.fall(entry, "the hand does not open that far", value=1e3 * width, limit=1e3 * limit, unit="mm")
+            ledger.fall(entry, "the hand does not open that far", value=width, limit=limit, unit="m")
             continue
         T = _plane_frame(part, f, width)
         contact = part.solid.face_polygon(f, _facing(T)).intersection(part.solid.face_polygon(g, _facing(T)))
         if contact.area < hand.min_contact_area:
-            ledger.fall(entry, "the faces overlap too little", value=1e6 * contact.area, limit=1e6 * hand.min_contact_area, unit="mm²")
+            ledger.fall(entry, "the faces overlap too little", value=contact.area, limit=hand.min_contact_area, unit="m²")
             continue
         classes.append(GraspClass((f, g), frozen_array(T), width, contact))
     return tuple(classes), ledger.entries
@@ -138,7 +138,7 @@ def grasp_groups(part: Part, hand: Hand) -> tuple[tuple[GraspGroup, ...], tuple[
             if not found:
                 option = f"{grasp_class.name}, edge {number}"
                 ledger.add("approach group", option, "the fingers find too little contact behind this edge",
-                           limit=1e6 * hand.min_contact_area, unit="mm²")  # fmt: skip
+                           limit=hand.min_contact_area, unit="m²")  # fmt: skip
             groups += found
     return tuple(groups), ledger.entries
 

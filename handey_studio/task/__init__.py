@@ -2,7 +2,7 @@
 
 from handey_studio.task.destination import format_pose, goal_poses, parse_destination
 from handey_studio.task.legs import Start
-from handey_studio.task.move import MoveOptions, check_command, describe, plan_move
+from handey_studio.task.move import MoveOptions, check_command, plan_move
 from handey_studio.task.plan import GraspChoice, MoveCommand, MovePlan, MoveResult, Step
 from handey_studio.task.run import Station, execute_in, plan_in, run_move, sense
 from handey_studio.task.sense import Scene, believed_world
@@ -19,7 +19,6 @@ __all__ = [
     "Step",
     "believed_world",
     "check_command",
-    "describe",
     "execute_in",
     "format_pose",
     "goal_poses",

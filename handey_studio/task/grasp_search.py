@@ -78,13 +78,13 @@ def _fall_illegal(rotations: LegalRotations, entry: int, ledger: Ledger) -> None
         end = 0 if not legal[:, 0].any() else 1
         k = int(np.argmax(np.where(rotations.areas >= rotations.min_area, rotations.clearances[:, end], -np.inf)))
         where = ("pickup", "putdown")[end]
-        ledger.fall(entry, f"the hand collides at every angle at the {where}", value=1e3 * float(rotations.clearances[k, end]),
-                    limit=1e3 * HAND_MARGIN_M, unit="mm", bodies=rotations.blockers[k][end])  # fmt: skip
+        ledger.fall(entry, f"the hand collides at every angle at the {where}", value=float(rotations.clearances[k, end]),
+                    limit=HAND_MARGIN_M, unit="m", bodies=rotations.blockers[k][end])  # fmt: skip
         return
     k = int(np.argmax(rotations.clearances.min(axis=1)))
     end = int(np.argmin(rotations.clearances[k]))
-    ledger.fall(entry, "no hand angle is legal at pickup and putdown together", value=1e3 * float(rotations.clearances[k, end]),
-                limit=1e3 * HAND_MARGIN_M, unit="mm", bodies=rotations.blockers[k][end])  # fmt: skip
+    ledger.fall(entry, "no hand angle is legal at pickup and putdown together", value=float(rotations.clearances[k, end]),
+                limit=HAND_MARGIN_M, unit="m", bodies=rotations.blockers[k][end])  # fmt: skip
 
 
 def _approached(option: Option, rotations: LegalRotations, angle: float, side: int, parent: int, ledger: Ledger) -> Grasp | None:
@@ -96,13 +96,13 @@ def _approached(option: Option, rotations: LegalRotations, angle: float, side: i
         reason = {"stuck": "the approach got stuck", "iterations": "the approach ran out of steps"}.get(
             run.status, "the way in starts blocked"
         )
-        ledger.fall(entry, reason, value=1e3 * run.distance, limit=0.0, unit="mm")
+        ledger.fall(entry, reason, value=run.distance, limit=0.0, unit="m")
         return None
     final = run.path[-1]
     area = contact_area(group.grasp_class, hand, final[:2], final[2])
     if area < hand.min_contact_area:
-        ledger.fall(entry, "the fingers overlap the face too little after the approach", value=1e6 * area,
-                    limit=1e6 * hand.min_contact_area, unit="mm²")  # fmt: skip
+        ledger.fall(entry, "the fingers overlap the face too little after the approach", value=area,
+                    limit=hand.min_contact_area, unit="m²")  # fmt: skip
         return None
     T_part_plane = group.grasp_class.T_part_plane
     in_plane = np.array([hand_in_plane(pose[:2], pose[2], side) for pose in run.path])
@@ -112,8 +112,8 @@ def _approached(option: Option, rotations: LegalRotations, angle: float, side: i
     for where, world, T in (("pickup", option.goal.at_start, hands[-1]), ("putdown", option.goal.at_goal, retreat[0])):
         clearance = collision_model(world).hand_contact(T, opening_around(hand, group.grasp_class.width))
         if clearance.distance < HAND_MARGIN_M:
-            ledger.fall(entry, f"the hand, turned by the approach, collides at the {where}", value=1e3 * clearance.distance,
-                        limit=1e3 * HAND_MARGIN_M, unit="mm", bodies=clearance.bodies)  # fmt: skip
+            ledger.fall(entry, f"the hand, turned by the approach, collides at the {where}", value=clearance.distance,
+                        limit=HAND_MARGIN_M, unit="m", bodies=clearance.bodies)  # fmt: skip
             return None
     choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), area)
     return Grasp(option, choice, run, hands, retreat, entry)
@@ -174,19 +174,19 @@ def reachable(world: World, T_world_hand: NDArray, opening: float, near: NDArray
     branches = arm.nearest_turns(arm.ik(T_world_hand), near)
     if not len(branches):
         distance = np.linalg.norm(T_world_hand[:3, 3] - world.robot.T_world_base[:3, 3])
-        ledger.add("reach", f"IK at the {where}", "out of the arm's reach", parent=entry, value=1e3 * distance, unit="mm")
+        ledger.add("reach", f"IK at the {where}", "out of the arm's reach", parent=entry, value=distance, unit="m")
         return []
     free = []
     for k, q in enumerate(branches):
         margin = float(world.robot.limit_margin(q))
         if margin < MIN_JOINT_MARGIN_RAD:
             ledger.add("reach", f"IK branch {k} at the {where}", "too close to a joint limit", parent=entry,
-                       value=np.rad2deg(margin), limit=np.rad2deg(MIN_JOINT_MARGIN_RAD), unit="°")  # fmt: skip
+                       value=margin, limit=MIN_JOINT_MARGIN_RAD, unit="rad")  # fmt: skip
             continue
         contact = collision_model(world).in_contact(q, opening, margin=HAND_MARGIN_M)
         if contact is not None:
-            ledger.add("reach", f"IK branch {k} at the {where}", "the arm collides", parent=entry, value=1e3 * contact.distance,
-                       limit=1e3 * HAND_MARGIN_M, unit="mm", bodies=contact.bodies)  # fmt: skip
+            ledger.add("reach", f"IK branch {k} at the {where}", "the arm collides", parent=entry, value=contact.distance,
+                       limit=HAND_MARGIN_M, unit="m", bodies=contact.bodies)  # fmt: skip
             continue
         free.append(q)
     return sorted(free, key=lambda q: float(np.abs(q - near).max()))

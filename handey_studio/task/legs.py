@@ -133,8 +133,8 @@ def _carry(
         return None
     steps, certificate = _steps(grasp, pickup, putdown, start, (there, transfer, home))
     if not certificate.proved:
-        ledger.add("certificate", "the whole plan", certificate.reason or "not proved", parent=grasp.entry, unit="mm",
-                   value=1e3 * certificate.least_clearance, limit=1e3 * certificate.margin, bodies=certificate.bodies)  # fmt: skip
+        ledger.add("certificate", "the whole plan", certificate.reason or "not proved", parent=grasp.entry, unit="m",
+                   value=certificate.least_clearance, limit=certificate.margin, bodies=certificate.bodies)  # fmt: skip
         return None
     margin = min(float(goal.at_start.robot.limit_margin(step.q_rad).min()) for step in steps)
     return MovePlan(

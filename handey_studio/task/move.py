@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handey_studio.base import Entry, Ledger, Progress, Silent
+from handey_studio.base import Entry, Ledger, Progress, Silent, describe
 from handey_studio.base.errors import unknown_name
 from handey_studio.task.destination import base_name, goal_poses, parse_destination
 from handey_studio.task.grasp_search import grasps_of
@@ -106,18 +106,6 @@ def _goal_reason(world: World, command: MoveCommand, ledger: Ledger) -> str:
     if not fallen:
         return f'nothing to put it on: "{command.to}" needs another part than the one that moves; found: {located}'
     return describe(fallen[0])
-
-
-def describe(entry: Entry) -> str:
-    """An entry's reason with its number, limit and bodies, as it is read on screen."""
-    text = entry.reason or ""
-    if entry.bodies:
-        text += f" ({' and '.join(entry.bodies)})"
-    if entry.value is not None:
-        text += f": {entry.value:.1f} {entry.unit}"
-        if entry.limit is not None:
-            text += f", limit {entry.limit:.1f} {entry.unit}"
-    return text
 
 
 def _why_none(entries: tuple[Entry, ...]) -> str:

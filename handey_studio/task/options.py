@@ -71,17 +71,17 @@ def check_goal(world: World, instance: PlacedPart, label: str, T_world_goal: NDA
     low, high = world.free_space
     outside = np.maximum(low - placed.corners_world, placed.corners_world - high).max()
     if outside > 0 and placed.corners_world[:, 2].min() > world.table_z - ALLOWED_DEPTH_M:
-        ledger.fall(entry, "the destination lies outside the free space", value=1e3 * outside, limit=0.0, unit="mm")
+        ledger.fall(entry, "the destination lies outside the free space", value=outside, limit=0.0, unit="m")
         return None
     near = neighbours(carried, placed, MAX_GAP_M)
     for neighbour in near:
         if neighbour.gap < -ALLOWED_DEPTH_M:
-            ledger.fall(entry, "the part would stand in something at the destination", value=-1e3 * neighbour.gap,
-                        limit=1e3 * ALLOWED_DEPTH_M, unit="mm", bodies=(instance.name, neighbour.name))  # fmt: skip
+            ledger.fall(entry, "the part would stand in something at the destination", value=-neighbour.gap,
+                        limit=ALLOWED_DEPTH_M, unit="m", bodies=(instance.name, neighbour.name))  # fmt: skip
             return None
     if not any(neighbour.below for neighbour in near):
         height = placed.corners_world[:, 2].min() - world.table_z
-        ledger.fall(entry, "nothing holds the part up at the destination", value=1e3 * height, limit=1e3 * MAX_GAP_M, unit="mm")
+        ledger.fall(entry, "nothing holds the part up at the destination", value=height, limit=MAX_GAP_M, unit="m")
         return None
     return Goal(instance, label, T_world_goal, entry, world, carried, carried.with_part(placed))
 

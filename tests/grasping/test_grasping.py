@@ -54,8 +54,8 @@ def test_a_part_too_big_for_the_hand_falls_with_the_number_and_the_limit():
     classes, entries = grasp_classes(Part("crate", box((0.2, 0.3, 0.25))), HAND)
     assert not classes
     assert rejected_counts(entries) == {"the hand does not open that far": 3}
-    assert {round(entry.value) for entry in entries if entry.value is not None} == {200, 250, 300}
-    assert all(entry.limit is not None and entry.limit < 100 for entry in entries)
+    assert {round(1e3 * entry.value) for entry in entries if entry.value is not None} == {200, 250, 300}
+    assert all(entry.limit is not None and entry.limit < 0.1 for entry in entries)
 
 
 def test_a_needle_has_too_little_contact():
