@@ -15,6 +15,7 @@ from handey_studio.localization.samples import PartSamples
 
 ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
 GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on
+ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but raggedly
 MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the edge to count as found
 
 
@@ -62,7 +63,7 @@ def edge_tally(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence,
     states = _edge_states(R, t, samples, evidence, limits)
     edges = int(samples.edge.max()) + 1
     visible = np.bincount(samples.edge, states >= 0, edges)
-    found = np.bincount(samples.edge, states == 1, edges)
+    found = np.bincount(samples.edge, states >= 1, edges)
     total = np.bincount(samples.edge, minlength=edges)
     predicted = (visible >= 2) & (visible >= 0.2 * total)
     return int(predicted.sum()), int((predicted & (found >= MIN_EDGE_SHARE * visible)).sum())
@@ -97,7 +98,8 @@ def facing(R, normal, x, y, z, camera):
 
 @njit(cache=True)
 def edge_state(R, t, k, samples, evidence, limits):
-    """One edge sample at a pose: 1 found, 0 visible but missing, −1 not to be seen. Then the nearest edge pixel, or −1."""
+    """One edge sample at a pose: 1 found, 2 no edge pixel but the surface ends there, 0 visible but missing, −1 not to be seen.
+    Then the edge pixel that was found, or −1."""
     p = samples.edge_point[k]
     x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
     inset = limits.edge + evidence.pixel
@@ -117,16 +119,20 @@ def edge_state(R, t, k, samples, evidence, limits):
         return -1, -1
     a = samples.along[k]
     edge, sideways = nearest_edge(x, y, z, _dot(R, 0, a), _dot(R, 1, a), _dot(R, 2, a), evidence)
-    if edge < 0 or sideways > limits.edge + 0.7 * evidence.pixel or abs(evidence.edge_point[edge, 2] - z) > limits.edge_depth:
-        return 0, -1
-    if flanks == 1:  # a silhouette: sensors lose readings there, they do not add any
-        u, v = project(x, y, z, evidence.camera)
-        u2, v2 = project(x + inset * ix, y + inset * iy, z + inset * iz, evidence.camera)
-        du, dv = u2 - u, v2 - v
+    close = edge >= 0 and sideways <= limits.edge + 0.7 * evidence.pixel and abs(evidence.edge_point[edge, 2] - z) <= limits.edge_depth
+    if flanks == 2:
+        return (1, edge) if close else (0, -1)
+    # a silhouette: sensors lose readings there, they do not add any
+    u, v = project(x, y, z, evidence.camera)
+    u2, v2 = project(x + inset * ix, y + inset * iy, z + inset * iz, evidence.camera)
+    du, dv = u2 - u, v2 - v
+    if close:
         inside = (evidence.edge_uv[edge, 0] - u) * du + (evidence.edge_uv[edge, 1] - v) * dv
-        if inside * inset / (du * du + dv * dv + 1e-12) < -limits.outside - 0.7 * evidence.pixel:
-            return 0, -1
-    return 1, edge
+        if inside * inset / (du * du + dv * dv + 1e-12) >= -limits.outside - 0.7 * evidence.pixel:
+            return 1, edge
+    beyond = limits.outside + evidence.pixel
+    seen = reading_at(x - beyond * ix, y - beyond * iy, z - beyond * iz, evidence, limits)[0]
+    return (2 if seen == THROUGH or seen == UNKNOWN else 0), -1
 
 
 @njit(cache=True)
@@ -143,7 +149,9 @@ def _verify(R, t, samples, evidence, limits, every):
     for n in range(len(t)):
         for k in range(n % every, len(samples.edge), every):
             state, _ = edge_state(R[n], t[n], k, samples, evidence, limits)
-            if state >= 0:
+            if state == 2:
+                out[n, 0] += ENDS_WORTH * samples.edge_weight[k]
+            elif state >= 0:
                 out[n, 1 - state] += samples.edge_weight[k]
         for k in range(n % every, len(samples.face_weight), every):
             p = samples.face_point[k]
