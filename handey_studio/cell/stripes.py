@@ -69,7 +69,7 @@ class Surfaces:
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = (normals @ origin - self.offsets[triangle]) / cosine
         hit = (triangle >= 0) & (cosine > 0)
-        points = np.where(hit[:, None], origin + directions * distance[:, None], np.nan)
+        points = origin + directions * np.where(hit, distance, np.nan)[:, None]
         return Hits(points, np.where(hit, self.face[triangle], -1), cosine)
 
 
