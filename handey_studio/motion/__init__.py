@@ -4,6 +4,8 @@ from handey_studio.motion.certificate import MARGIN_M, certify
 from handey_studio.motion.path import plan_path
 from handey_studio.motion.query import PathOptions
 from handey_studio.motion.results import Certificate, CSpaceSummary, Leg, PathResult, Trajectory
+from handey_studio.motion.straight import straight_path
+from handey_studio.motion.timing import time_path
 
 __all__ = [
     "MARGIN_M",
@@ -15,4 +17,6 @@ __all__ = [
     "Trajectory",
     "certify",
     "plan_path",
+    "straight_path",
+    "time_path",
 ]

@@ -70,7 +70,8 @@ def configuration_space(mover: Mover, spheres: ArmSpheres, wrist: NDArray, step:
     blocked = _blocked(mover, spheres, values, step)
     blocked |= _self_blocked(chain, mover.bodies.shapes, mover.opening, values[1], values[2], np.asarray(wrist, dtype=float))[None]
     whole = blocked[np.ix_(*(np.arange(counts[i]) % turn for i in range(3)))]
-    regions, _ = ndimage.label(~whole, structure=np.ones((3, 3, 3)))
+    regions = np.empty(whole.shape, np.int32)
+    ndimage.label(~whole, structure=np.ones((3, 3, 3)), output=regions)
     return ConfigurationSpace(step, lower, whole, regions)
 
 

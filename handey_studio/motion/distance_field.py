@@ -75,7 +75,7 @@ def _fill_bodies(taken: NDArray, fixed: Obstacles, chosen: NDArray, low: NDArray
     """Voxels that a convex body meets."""
     voxel, first, last = np.empty((8, 3)), np.zeros(3, np.int64), np.zeros(3, np.int64)
     for body in chosen:
-        a, b = fixed.first[body], fixed.first[body + 1]
+        a, b = int(fixed.first[body]), int(fixed.first[body + 1])
         for axis in range(3):
             first[axis] = max(int((fixed.corners[a:b, axis].min() - low[axis]) // cell), 0)
             last[axis] = min(int((fixed.corners[a:b, axis].max() - low[axis]) // cell), taken.shape[axis] - 1)

@@ -1,6 +1,8 @@
 """The legs from the start, and from the goal, to the free space: the arm as it is, the wrist as it is (Handey 1987 §4)."""
 
 import heapq
+from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,8 @@ from scipy import ndimage
 from handey_studio.motion.certificate import Mover
 from handey_studio.motion.configuration_space import ConfigurationSpace
 from handey_studio.motion.search import nearest_free
+
+Node = tuple[int, int, int]
 
 STRAIGHT_TRIES = 40
 FINE_STEP_RAD = float(np.deg2rad(2.5))
@@ -37,10 +41,10 @@ def _fine_leg(
     if ahead is None:
         return None
     robot = mover.model.world.robot
-    parents: dict[tuple[int, ...], tuple[int, ...] | None] = {(0, 0, 0): None}
-    costs = {(0, 0, 0): 0.0}
-    heap = [(0.0, (0, 0, 0))]
-    done: set[tuple[int, ...]] = set()
+    parents: dict[Node, Node | None] = {(0, 0, 0): None}
+    costs: dict[Node, float] = {(0, 0, 0): 0.0}
+    heap: list[tuple[float, Node]] = [(0.0, (0, 0, 0))]
+    done: set[Node] = set()
     while heap and len(done) < expansions:
         _, node = heapq.heappop(heap)
         if node in done:
@@ -63,24 +67,24 @@ def _fine_leg(
     return None
 
 
-_MOVES = [m for m in np.ndindex(3, 3, 3) if m != (1, 1, 1)]
-_MOVES = [(a - 1, b - 1, c - 1) for a, b, c in _MOVES if abs(a - 1) + abs(b - 1) + abs(c - 1) <= 2]
+_MOVES = [(a, b, c) for a, b, c in product((-1, 0, 1), repeat=3) if 1 <= abs(a) + abs(b) + abs(c) <= 2]
 
 
-def _angles(q: NDArray, node: tuple[int, ...]) -> NDArray:
+def _angles(q: NDArray, node: Node) -> NDArray:
     out = q.copy()
     out[:3] += np.array(node) * FINE_STEP_RAD
     return out
 
 
-def _chain(parents: dict[tuple[int, ...], tuple[int, ...] | None], node: tuple[int, ...]) -> list[tuple[int, ...]]:
-    chain = [node]
-    while (parent := parents[chain[-1]]) is not None:
+def _chain(parents: dict[Node, Node | None], node: Node) -> list[Node]:
+    chain, parent = [node], parents[node]
+    while parent is not None:
         chain.append(parent)
+        parent = parents[parent]
     return chain[::-1]
 
 
-def _distance_to_region(space: ConfigurationSpace, q: NDArray, region: int):
+def _distance_to_region(space: ConfigurationSpace, q: NDArray, region: int) -> Callable[[NDArray], float] | None:
     """The joint distance [rad] to the region's cells as a function of q; None when none is near."""
     centre = np.array(space.cell(q))
     low = np.maximum(centre - WINDOW_CELLS, 0)
