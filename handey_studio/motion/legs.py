@@ -72,7 +72,7 @@ _MOVES = [(a, b, c) for a, b, c in product((-1, 0, 1), repeat=3) if 1 <= abs(a) 
 
 def _angles(q: NDArray, node: Node) -> NDArray:
     out = q.copy()
-    out[:3] += np.array(node) * FINE_STEP_RAD
+    out[:3] += np.array(node, dtype=float) * FINE_STEP_RAD
     return out
 
 
@@ -92,7 +92,7 @@ def _distance_to_region(space: ConfigurationSpace, q: NDArray, region: int) -> C
     window = space.regions[low[0] : high[0], low[1] : high[1], low[2] : high[2]] != region
     if window.all():
         return None
-    distances = ndimage.distance_transform_edt(window) * space.step
+    distances = np.asarray(ndimage.distance_transform_edt(window)) * space.step
 
     def ahead(here: NDArray) -> float:
         i, j, k = np.clip(np.array(space.cell(here)) - low, 0, np.array(window.shape) - 1)

@@ -14,6 +14,7 @@ from handey_studio.world.collision import Pairs
 
 STAGE = "straight path"
 JUMP_RAD = 0.35  # from one pose to the next, millimetres on, a joint on the same branch turns less than this
+LEAST_M = 1e-4  # bodies that must not touch and come nearer than this do touch, for all that anyone can tell
 SAME_POSE = (1e-4, 1e-3)  # m, rad: the start stands at the first pose
 
 
@@ -44,8 +45,15 @@ def straight_path(
         ledger.add(STAGE, f"pose {len(points) - 1 + first} of {len(hands)}", reason)
         return PathResult("none", reason, np.empty((0, arm.n)), entries=ledger.entries)
     mine = mover(world, opening, held, allowed, margin)
-    least = min(max(mine.model.clearance(q, opening, held, allowed, limit=2 * margin).distance, 0.0) for q in points)
-    mine.margin = min(margin, least / 2)
+    clearances = [mine.model.clearance(q, opening, held, allowed, limit=2 * margin) for q in points]
+    k = int(np.argmin([clearance.distance for clearance in clearances]))
+    if clearances[k].distance < LEAST_M:
+        reason = f"{clearances[k]} at pose {k + 1} of {len(points)}"
+        ledger.add(
+            STAGE, f"{len(points)} postures", reason, value=clearances[k].distance, limit=LEAST_M, unit="m", bodies=clearances[k].bodies
+        )
+        return PathResult("none", reason, np.empty((0, arm.n)), entries=ledger.entries)
+    mine.margin = min(margin, clearances[k].distance / 2)
     certificate = certify_with(mine, points)
     entry = ledger.add(STAGE, f"{len(points)} postures", value=certificate.least_clearance, limit=mine.margin, unit="m")
     if not certificate.proved:

@@ -32,7 +32,7 @@ def time_path(robot: Robot, q_rad: ArrayLike, opening: ArrayLike | None = None, 
     keep = np.r_[True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-12]
     path, openings = path[keep], openings[keep]
     if len(path) == 1:
-        return Trajectory([0.0], path, openings)
+        return Trajectory(np.zeros(1), path, openings)
     lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
     directions = np.diff(path, axis=0) / lengths[:, None]
     with np.errstate(divide="ignore"):
@@ -42,7 +42,8 @@ def time_path(robot: Robot, q_rad: ArrayLike, opening: ArrayLike | None = None, 
     rows = [(0.0, 0, 0.0)]
     for k, (v0, v1) in enumerate(pairwise(corners)):
         times, places = _trapezoid(lengths[k], v0, v1, fastest[k], hardest[k])
-        rows += [(rows[-1][0] + t, k, s / lengths[k]) for t, s in zip(np.diff(times, prepend=0.0), places, strict=True)]
+        before = rows[-1][0]
+        rows += [(before + t, k, s / lengths[k]) for t, s in zip(times, places, strict=True)]
     time, segment, share = (np.array(column) for column in zip(*rows, strict=True))
     a, b = path[segment], path[segment + 1]
     widths = openings[segment] + share * (openings[segment + 1] - openings[segment])
