@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
+import fcl
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import apply
-from handey_studio.world.collision import penetration
+from handey_studio.world.collision import fcl_convex, penetration
 from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, columns_of, solids_of
 from handey_studio.world.gjk import distance
 from handey_studio.world.part import PlacedPart
@@ -48,4 +49,6 @@ def _gap(name: str, piece: NDArray, corners: NDArray) -> float:
     if apart > 0:
         return float(apart)
     # A column is as narrow as the map's cell: how deep the part stands in it counts downwards.
-    return float(piece[:, 2].min() - corners[:, 2].max()) if name == DEPTH_MAP else -penetration(piece, corners)
+    if name == DEPTH_MAP:
+        return float(piece[:, 2].min() - corners[:, 2].max())
+    return -penetration(*(fcl.CollisionObject(fcl_convex(body)) for body in (piece, corners)))
