@@ -14,7 +14,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.geometry.transforms import inverse
+from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.sensing.range_finder import RangeFinder, fuse, triangulate
 
@@ -76,7 +76,8 @@ class Surfaces:
 def stripe_peaks(finder: RangeFinder, camera: int, surfaces: Surfaces) -> Peaks:
     """All peaks in one camera's photographs, without noise."""
     view = finder.cameras[camera]
-    v, u = np.mgrid[: view.height, : view.width].reshape(2, -1)
+    columns, rows = _window(finder, camera, float(surfaces.triangles[..., 2].max()))
+    v, u = np.stack(np.meshgrid(rows, columns, indexing="ij")).reshape(2, -1)
     rays = view.projection.unproject(np.stack([u, v], axis=-1).astype(float), np.ones(u.size))
     rays = (rays / np.linalg.norm(rays, axis=1, keepdims=True)) @ view.T_range_camera[:3, :3].T
     seen = surfaces.first(view.T_range_camera[:3, 3], rays)
@@ -85,8 +86,20 @@ def stripe_peaks(finder: RangeFinder, camera: int, surfaces: Surfaces) -> Peaks:
     offset = seen.points - finder.laser
     angle = np.arctan2(offset[:, 0], -offset[:, 2])
     number = (angle + finder.sweep_rad) / (2 * finder.sweep_rad) * (finder.planes - 1)
-    grid = (view.height, view.width)
-    return _crossings(number.reshape(grid), np.where(lit, seen.face, -1).reshape(grid), finder.planes)
+    grid = (len(rows), len(columns))
+    peaks = _crossings(number.reshape(grid), np.where(lit, seen.face, -1).reshape(grid), finder.planes)
+    return Peaks(peaks.u + columns[0], peaks.v + rows[0], peaks.plane)
+
+
+def _window(finder: RangeFinder, camera: int, top: float) -> tuple[NDArray, NDArray]:
+    """The columns and rows of the photographs that can show the scan area, from the table's level up to `top` [m]."""
+    view = finder.cameras[camera]
+    x, y = finder.area
+    corners = np.array([[i, j, k] for i in (0.0, x) for j in (0.0, y) for k in (min(0.0, top), max(0.0, top))])
+    uv = view.projection.project(apply(inverse(view.T_range_camera), corners))
+    low, high = np.floor(uv.min(axis=0)).astype(int) - 2, np.ceil(uv.max(axis=0)).astype(int) + 3
+    columns = np.arange(max(0, low[0]), max(2, min(view.width, high[0])))
+    return columns, np.arange(max(0, low[1]), max(2, min(view.height, high[1])))
 
 
 def _lit(finder: RangeFinder, surfaces: Surfaces, points: NDArray) -> NDArray:
