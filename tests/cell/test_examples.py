@@ -5,6 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from handey_studio.cell.bodies import fixed_bodies, solid_body
+from handey_studio.cell.checker import check_plan, names_in_plan
 from handey_studio.cell.examples import figure1
 from handey_studio.cell.fitness import graspable, visible_share
 from handey_studio.cell.penetration import body_overlap
@@ -12,6 +13,7 @@ from handey_studio.cell.physics import settle
 from handey_studio.cell.stripes import Surfaces
 from handey_studio.geometry.transforms import apply, inverse, pose_difference
 from handey_studio.world import arm_of
+from tests.cell.conftest import over_l_block, raised
 
 
 def bodies_of(library):
@@ -52,6 +54,40 @@ def test_the_two_ls_make_a_block_that_stands(library, robot):
     moved, turned = pose_difference(stood.bodies[-1].T_world_body, goal.T_world_body)
     assert stood.resting and moved < 1e-3 and turned < 0.02
     assert np.linalg.norm(goal.T_world_body[:3, 3] - arm_of(robot).link_poses(robot.home)[1, :3, 3]) < 0.8
+
+
+def test_the_task_can_be_done(library, arms, robot, cell):
+    """By the truth alone: a grip from above, a straight joint line across and a guarded descent end in the mating pose."""
+    name = "l_block#2"
+    start, base = cell.true_pose(name), cell.true_pose("l_block#1")
+    goal = base @ library.part("l_block").mates["block"].T_this_part
+    T_pick = over_l_block(start, (0.0147, 0.015, 0.02))
+    T_put = goal @ inverse(start) @ T_pick
+    down = arms.line(raised(T_pick, 0.12), T_pick, arms.at(raised(T_pick, 0.12), robot.home))
+    place = arms.line(raised(T_put, 0.10), T_put, arms.at(raised(T_put, 0.10), down[0]))
+    fingers = (("finger_left", name), ("finger_right", name))
+    steps = [
+        arms.step("free", [robot.home, down[0]], 0.1),
+        arms.step("approach", down, np.linspace(0.1, 0.06, len(down))),
+        arms.step("close", [down[-1]] * 2, (0.06, 0.04), allowed=fingers),
+        arms.step("lift", down[::-1], 0.04, name, (*fingers, (name, "table"), (name, "depth map"))),
+        arms.step("transfer", [down[0], place[0]], 0.04, name, fingers),
+        arms.step("place", place, 0.04, name, (*fingers, (name, "l_block#1"))),
+    ]
+    called = names_in_plan(cell.true_scene(), {name: start, "l_block#1": base})
+    report = check_plan(steps, cell.true_scene(), robot, called)
+    assert report.ok, report.violations
+
+    for step in steps[:2]:
+        cell.follow(step.motion)
+    cell.grip(0.0375)
+    cell.follow(steps[3].motion)
+    cell.follow(steps[4].motion)
+    below = arms.line(raised(T_put, 0.10), raised(T_put, -0.005), place[0], 40)
+    assert cell.descend(arms.step("place", below, 0.04).motion).contact
+    cell.grip(robot.hand.opening_max)
+    moved, turned = pose_difference(cell.true_pose(name), goal)
+    assert moved < 2e-4 and turned < 2e-3
 
 
 def test_the_hooked_l_would_stand_out_if_it_were_turned_half_a_turn(library):
