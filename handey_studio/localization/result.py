@@ -18,9 +18,9 @@ class LocateOptions:
     height [m] below which no part can be (None: no such plane)."""
 
     max_poses: int = 5
-    min_score: float = 0.75
+    min_score: float = 0.8
     min_edge_share: float = 0.7
-    min_surface_share: float = 0.85
+    min_surface_share: float = 0.93
     min_visible_fraction: float = 0.12
     min_edge_m: float | None = None
     max_data_edges: int = 120

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.localization.pairs import model_edges
+from handey_studio.localization.pairs import ModelEdges, model_edges
 from handey_studio.world.part import Part
 
 EDGE_SAMPLES = 320
@@ -21,7 +21,8 @@ class PartSamples(NamedTuple):
 
     Edges: `edge_point` (n, 3), its number `edge` (n,) in the table of model edges, unit `along`, normals `left`, `right`
     (n, 3), directions `into_left`, `into_right` (n, 3) from the edge into its faces, and `edge_weight` (n,) [m], the
-    length it stands for. Faces: `face_point`, `face_normal` (m, 3) and `face_weight` (m,) [m²].
+    length it stands for. Faces: `face_point`, `face_normal` (m, 3) `face_weight` (m,) [m²]
+    and `face_rim` (m,) [m], how far it is from the nearest edge.
     """
 
     edge_point: NDArray
@@ -35,6 +36,7 @@ class PartSamples(NamedTuple):
     face_point: NDArray
     face_normal: NDArray
     face_weight: NDArray
+    face_rim: NDArray
 
 
 @lru_cache(maxsize=64)
@@ -49,9 +51,16 @@ def part_samples(part: Part, density: int = 1) -> PartSamples:
     points = edges.middle[number] + (place * edges.half[number])[:, None] * along
     weight = (2.0 * edges.half / counts)[number]
     face_point, face_normal, face_weight = _face_samples(part, density * FACE_SAMPLES)
-    return PartSamples(
-        points, number, along, left, right, np.cross(left, along), -np.cross(right, along), weight, face_point, face_normal, face_weight
-    )
+    into_left, into_right = np.cross(left, along), -np.cross(right, along)
+    rim = _distance_to_edges(face_point, edges)
+    return PartSamples(points, number, along, left, right, into_left, into_right, weight, face_point, face_normal, face_weight, rim)
+
+
+def _distance_to_edges(points: NDArray, edges: ModelEdges) -> NDArray:
+    """Distance (m,) [m] of points (m, 3) to the nearest edge."""
+    from_middle = points[:, None] - edges.middle
+    along = np.clip(np.einsum("mni,ni->mn", from_middle, edges.direction), -edges.half, edges.half)
+    return np.linalg.norm(from_middle - along[..., None] * edges.direction, axis=2).min(axis=1)
 
 
 def _face_samples(part: Part, wanted: int) -> tuple[NDArray, NDArray, NDArray]:

@@ -15,6 +15,8 @@ from handey_studio.localization.samples import PartSamples
 
 ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
 GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on
+STEEP = 0.4  # cosine; a face seen more squarely than this should give readings
+UNREAD_COST = 0.3  # of a reading that sees through: no reading where there should be one
 ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but raggedly
 MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the edge to count as found
 
@@ -39,7 +41,7 @@ class Verdict(NamedTuple):
     @property
     def surface_share(self) -> NDArray:
         """Share of the faces that are not hidden where the readings agree."""
-        return self.on / np.maximum(self.on + self.through, 1e-12)
+        return self.on / np.maximum(self.on + self.through + UNREAD_COST * self.unknown, 1e-12)
 
     @property
     def visible_fraction(self) -> NDArray:
@@ -156,9 +158,15 @@ def _verify(R, t, samples, evidence, limits, every):
         for k in range(n % every, len(samples.face_weight), every):
             p = samples.face_point[k]
             x, y, z = _dot(R[n], 0, p) + t[n, 0], _dot(R[n], 1, p) + t[n, 1], _dot(R[n], 2, p) + t[n, 2]
-            if facing(R[n], samples.face_normal[k], x, y, z, evidence.camera) < GRAZING:
+            cosine = facing(R[n], samples.face_normal[k], x, y, z, evidence.camera)
+            if cosine < GRAZING:
                 continue
             seen, _, j, i = reading_at(x, y, z, evidence, limits)
+            rim = samples.face_rim[k] * cosine < limits.edge + 0.5 * evidence.pixel
+            if rim and (seen == THROUGH or seen == UNKNOWN):
+                continue  # the margin that sensors lose at silhouettes
+            if seen == UNKNOWN and cosine < STEEP:
+                seen = HIDDEN  # too steep to blame the part for the missing reading
             weight = samples.face_weight[k]
             out[n, 2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += weight
             if seen == ON and evidence.taken[j, i]:
