@@ -20,6 +20,7 @@ from handey_studio.world.collision_bodies import Shapes
 from handey_studio.world.collision_queries import Chain, body_distance, forward, placed
 
 TURN = 2 * np.pi
+REACH = 0.75 * TURN  # the way round the other side, and a quarter turn to spare
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +56,20 @@ class ConfigurationSpace(Value):
         return self.lower + (np.asarray(cells) + 0.5) * self.step
 
 
-def configuration_space(mover: Mover, spheres: ArmSpheres, wrist: NDArray, step: float) -> ConfigurationSpace:
+def configuration_space(
+    mover: Mover, spheres: ArmSpheres, wrist: NDArray, step: float, around: NDArray | None = None
+) -> ConfigurationSpace:
     """The space of a mover's arm, whose wrist is enclosed by `spheres`; `step` [rad] must divide a turn.
 
-    Where the arm's own bodies are compared its wrist is at `wrist` (3,) [rad].
+    Where the arm's own bodies are compared its wrist is at `wrist` (3,) [rad]. Each joint ranges within its limits, and no farther than
+    `REACH` from the configurations `around` (m, joints) [rad] when they are given: beyond that it is the same arm a turn on.
     """
     robot = mover.model.world.robot
-    lower, upper = robot.lower[:3], robot.upper[:3]
-    counts = np.floor((upper - lower) / step + 1e-9).astype(int)
+    lower, upper = np.array(robot.lower[:3]), np.array(robot.upper[:3])
+    if around is not None:
+        lower = lower + step * np.floor(np.maximum(around[:, :3].min(axis=0) - REACH - lower, 0.0) / step)
+        upper = np.minimum(upper, around[:, :3].max(axis=0) + REACH)
+    counts = np.maximum(np.floor((upper - lower) / step + 1e-9).astype(int), 1)
     turn = round(TURN / step)
     once = np.minimum(counts, turn)
     chain = mover.model.chain
@@ -131,16 +138,20 @@ def _tables(chain: Chain, centres: NDArray, radii: NDArray, values: tuple[NDArra
 
 
 @njit(cache=True)
-def _meets(field: Field, T: NDArray, where: NDArray, need: NDArray) -> bool:
-    """Whether any sphere, given in the frame T, lacks the clearance that it needs."""
-    for s in range(len(need)):
+def _meets(field: Field, T: NDArray, where: NDArray, need: NDArray, guess: int) -> int:
+    """The first sphere found, given in the frame T, that lacks the clearance it needs, or -1; `guess` is looked at first.
+
+    Neighbouring cells are mostly blocked by the same sphere.
+    """
+    for turn in range(-1, len(need)):
+        s = guess if turn < 0 else turn
         x, y, z = where[s, 0], where[s, 1], where[s, 2]
         px = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
         py = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
         pz = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
         if clearance_at(field, px, py, pz) < need[s]:
-            return True
-    return False
+            return s
+    return -1
 
 
 @njit(cache=True)
@@ -150,16 +161,20 @@ def _assemble(
     """The slices: joint 1 turns the tables of the links. Where link 1 or 2 meets something the whole row is forbidden."""
     n1, n2, n3 = len(turns), second[1].shape[0], third[1].shape[1]
     blocked = np.zeros((n1, n2, n3), np.bool_)
+    guess = 0
     for i in range(n1):
-        if _meets(field, turns[i], first[0][0, 0], first[1][0, 0]):
+        if _meets(field, turns[i], first[0][0, 0], first[1][0, 0], 0) >= 0:
             blocked[i] = True
             continue
         for j in range(n2):
-            if _meets(field, turns[i], second[0][j, 0], second[1][j, 0]):
+            if _meets(field, turns[i], second[0][j, 0], second[1][j, 0], 0) >= 0:
                 blocked[i, j] = True
                 continue
             for m in range(n3):
-                blocked[i, j, m] = _meets(field, turns[i], third[0][j, m], third[1][j, m])
+                met = _meets(field, turns[i], third[0][j, m], third[1][j, m], guess)
+                if met >= 0:
+                    blocked[i, j, m] = True
+                    guess = met
     return blocked
 
 

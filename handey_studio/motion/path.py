@@ -12,6 +12,7 @@ from handey_studio.motion.random_trees import grow_trees
 from handey_studio.motion.results import CSpaceSummary, Leg, PathResult
 from handey_studio.motion.shortcut import cut_corners, without_idle_points
 from handey_studio.motion.three_legs import three_legs
+from handey_studio.motion.wrist_ways import wrist_ways
 from handey_studio.world import Held, World
 from handey_studio.world.collision import Pairs
 
@@ -63,14 +64,15 @@ Attempt = tuple[str, NDArray, list[Mover], CSpaceSummary | None, str]
 
 def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Iterator[Attempt]:
     """What is tried, one after the other: what beyond the paper it needed, its points, their movers, the space, why it fell."""
-    direct = np.array([asked.start[3:], asked.goal[3:]])
-    home = np.array([asked.start[3:], asked.world.robot.home[3:], asked.goal[3:]])
     steps = asked.options.steps_deg
-    plans = [(direct, step, f"{step:g}° cells" if step != steps[0] else "") for step in steps]
-    plans.append((home, steps[-1], f"the home wrist in between, {steps[-1]:g}° cells"))
-    for k, (wrists, step, needed) in enumerate(plans):
+    ways = wrist_ways(asked, rng, 2)
+    plans = [(wrists, step, name) for step in steps for name, wrists in ways]
+    if not ways:
+        yield "wrist", np.empty((0, len(asked.start))), [], None, "the wrist finds no way to turn that keeps the hand off the arm"
+    for k, (wrists, step, name) in enumerate(plans):
         progress.report(k / (len(plans) + 1), f"configuration space of joints 1–3, {step:g}° cells")
         found = three_legs(asked, wrists, float(np.deg2rad(step)), fine=True)
+        needed = ", ".join(word for word in (name, f"{step:g}° cells" if step != steps[0] else "") if word)
         yield needed, found.points, found.movers, found.space, found.reason
     points, movers, growths = grow_trees(asked, rng, progress)
     why = "" if len(points) else f"random trees did not meet in {growths} growths"

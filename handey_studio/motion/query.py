@@ -24,9 +24,9 @@ class PathOptions:
 
     margin_m: float = MARGIN_M
     steps_deg: tuple[float, ...] = (5.0, 2.5)
-    regions: int = 3
-    fine_expansions: int = 400
-    repairs: int = 20
+    regions: int = 2
+    fine_expansions: int = 150
+    repairs: int = 8
     cut_rounds: int = 3
     tree_growths: int = 1500
 

@@ -5,6 +5,7 @@ import heapq
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from handey_studio.motion.configuration_space import ConfigurationSpace
 
@@ -26,19 +27,17 @@ def nearest_free(space: ConfigurationSpace, q: NDArray, region: int, count: int)
 
 def regions_by_distance(space: ConfigurationSpace, q_start: NDArray, q_goal: NDArray, most: int) -> list[int]:
     """Free regions, those that come nearest to start and goal together first."""
-    free = np.argwhere(~space.blocked)
-    if not len(free):
+    count = int(space.regions.max())
+    if count == 0:
         return []
-    numbers = space.regions[tuple(free.T)]
-    angles = space.centre(free)
     least = []
     for q in (q_start, q_goal):
-        near = np.full(int(numbers.max()) + 1, np.inf)
-        np.minimum.at(near, numbers, np.linalg.norm(angles - np.asarray(q)[:3], axis=1))
-        least.append(near)
+        a, b, c = ((centres - angle) ** 2 for centres, angle in zip(space.centres, np.asarray(q)[:3], strict=True))
+        squares = a[:, None, None] + b[None, :, None] + c[None, None, :]
+        least.append(np.sqrt(np.asarray(ndimage.minimum(squares, space.regions, np.arange(1, count + 1)))))
     total = least[0] + least[1]
     order = np.argsort(total, kind="stable")
-    return [int(k) for k in order[:most] if np.isfinite(total[k])]
+    return [int(k) + 1 for k in order[:most]]
 
 
 def find_cells(blocked: NDArray, start: tuple[int, int, int], goal: tuple[int, int, int]) -> NDArray:

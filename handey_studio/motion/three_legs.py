@@ -31,7 +31,8 @@ def three_legs(query: Query, wrists: NDArray, step: float, fine: bool) -> ThreeL
     `fine`: whether the finer grid is used near an end that no straight line leads away from.
     """
     spheres = arm_spheres(query.world.robot, wrists, query.opening, query.held)
-    space = configuration_space(query.free, spheres, wrists[len(wrists) // 2] if len(wrists) > 2 else wrists.mean(axis=0), step)
+    middle = wrists[len(wrists) // 2] if len(wrists) > 2 else wrists.mean(axis=0)
+    space = configuration_space(query.free, spheres, middle, step, np.array([query.start, query.goal]))
     regions = regions_by_distance(space, query.start, query.goal, query.options.regions)
     reason = "no cell of the space is free" if not regions else ""
     expansions = query.options.fine_expansions if fine else 0
@@ -41,12 +42,12 @@ def three_legs(query: Query, wrists: NDArray, step: float, fine: bool) -> ThreeL
         if first is None or last is None:
             reason = reason or f"the {'start' if first is None else 'goal'} does not reach the free cells nearest to it"
             continue
-        middle, cells = _free_leg(query, space, region, wrists, first[1], last[1])
-        if not len(middle):
+        between, cells = _free_leg(query, space, region, wrists, first[1], last[1])
+        if not len(between):
             reason = reason or "the whole arm fails in the cells that its model with the wrist box calls free"
             continue
-        points = np.concatenate([first[0], middle[1:], last[0][::-1][1:]])
-        movers = [query.leaving] * (len(first[0]) - 1) + [query.free] * (len(middle) - 1) + [query.arriving] * (len(last[0]) - 1)
+        points = np.concatenate([first[0], between[1:], last[0][::-1][1:]])
+        movers = [query.leaving] * (len(first[0]) - 1) + [query.free] * (len(between) - 1) + [query.arriving] * (len(last[0]) - 1)
         return ThreeLegs(points, movers, "", summary(space, spheres, cells, first[1], last[1]))
     return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(space, spheres, np.empty((0, 3)), None, None))
 

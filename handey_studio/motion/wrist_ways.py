@@ -1,0 +1,51 @@
+"""How the wrist may turn from the start's posture to the goal's without the hand meeting the forearm.
+
+The paper interpolates; where that makes the wrist or the hand pass through the arm that carries them, no place of the
+first three joints helps, and the wrist goes by way of another posture.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.motion.certificate import Mover
+from handey_studio.motion.proof import PROVED, Motion, Verdict, prove
+from handey_studio.motion.query import Query
+from handey_studio.world.collision_bodies import terrain_obstacles
+from handey_studio.world.collision_queries import Scene
+
+DRAWN = 200  # wrist postures drawn at random when the straight way is closed
+
+
+def wrist_ways(query: Query, rng: np.random.Generator, most: int) -> list[tuple[str, NDArray]]:
+    """Up to `most` ways, corners (2 or 3, wrist joints) [rad], each with its name: the straight one, unnamed, and one by the home wrist.
+
+    Where the straight one is closed, the shortest ones by way of the home wrist and of postures drawn at random.
+    """
+    start, goal = query.start[3:], query.goal[3:]
+    ways = [("", np.array([start, goal]))] if wrist_turns(query.free, start, goal) else []
+    lower, upper = query.world.robot.lower[3:], query.world.robot.upper[3:]
+    home = query.world.robot.home[3:]
+    turned = home + 2 * np.pi * np.round(((start + goal) / 2 - home) / (2 * np.pi))
+    inside = ((turned >= lower) & (turned <= upper)).all()
+    names = {0: "the home wrist in between"}
+    low, high = np.minimum(start, goal) - np.pi / 2, np.maximum(start, goal) + np.pi / 2
+    drawn = rng.uniform(np.maximum(low, lower), np.minimum(high, upper), (DRAWN, len(start)))
+    between = np.concatenate([(turned if inside else home)[None], drawn])
+    lengths = np.abs(between - start).sum(axis=1) + np.abs(between - goal).sum(axis=1)
+    for k in np.argsort(lengths, kind="stable") if not ways else (0,):
+        if len(ways) >= most:
+            break
+        if wrist_turns(query.free, start, between[k]) and wrist_turns(query.free, between[k], goal):
+            ways.append((names.get(int(k), "another wrist posture in between"), np.array([start, between[k], goal])))
+    return ways
+
+
+def wrist_turns(mover: Mover, start: NDArray, end: NDArray) -> bool:
+    """Whether wrist, hand and part are proved to stay clear of the forearm and of each other while the wrist turns straight."""
+    shapes = mover.bodies.shapes
+    shapes = shapes._replace(pairs=np.ascontiguousarray(shapes.pairs[shapes.link[shapes.pairs].min(axis=1) >= 3]))
+    nothing = terrain_obstacles(None, 0.0, 0.0)
+    arm = np.zeros(3)
+    motion = Motion(np.concatenate([arm, start]), np.concatenate([arm, end]), mover.opening, mover.opening)
+    scene = Scene(nothing, nothing, mover.scene.rules)
+    return Verdict(*prove(mover.model.chain, shapes, scene, motion, float(mover.margin), 0.0)).outcome == PROVED
