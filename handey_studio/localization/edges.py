@@ -61,8 +61,9 @@ def _noise_growth(view: DepthView) -> NDArray:
 
 def _hysteresis(weak: NDArray, strong: NDArray) -> NDArray:
     """Connected weak pixels that hold a strong one."""
-    labels, count = ndimage.label(weak, structure=np.ones((3, 3)))
-    keep = np.zeros(count + 1, dtype=bool)
+    labels = np.zeros(weak.shape, dtype=np.int32)
+    ndimage.label(weak, structure=np.ones((3, 3)), output=labels)
+    keep = np.zeros(int(labels.max()) + 1, dtype=bool)
     keep[np.unique(labels[strong & weak])] = True
     keep[0] = False
     return keep[labels]

@@ -79,7 +79,8 @@ def _nearest(shape: tuple[int, ...], u: NDArray, v: NDArray, numbers: NDArray) -
     """(H, W) int32: which of the pixels is nearest."""
     empty = np.ones(shape, dtype=np.uint8)
     empty[v, u] = 0
-    _, labels = cv2.distanceTransformWithLabels(empty, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL)
+    found = cv2.distanceTransformWithLabels(empty, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL)
+    labels = np.asarray(found[1], dtype=np.int32)
     number_of = np.zeros(int(labels.max()) + 1, dtype=np.int32)
     number_of[labels[v, u]] = numbers
     return number_of[labels]

@@ -33,7 +33,12 @@ class Assignments(NamedTuple):
     fell: NDArray
 
 
-FELL = ("angle α differs", "distance d differs", "longer than its model edge, or past its end (a1, a2)", "surface beside the edge faces another way")
+FELL = (
+    "angle α differs",
+    "distance d differs",
+    "longer than its model edge, or past its end (a1, a2)",
+    "surface beside the edge faces another way",
+)
 
 
 def tolerances(view: DepthView) -> MatchTolerances:

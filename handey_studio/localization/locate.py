@@ -28,6 +28,7 @@ from handey_studio.world.part import Part
 ROUGH = 1.8  # tolerances of poses straight from two edges, against those of refined ones
 SHOWN = 50  # hypotheses that go to the screen
 MIN_EDGE_PX = 8.0
+STAGES = ("edges", "evidence", "hypothesize", "verify", "refine", "accept")
 TABLE_SHARE = 0.02  # of the readings that must lie at the table's height before the table is believed in
 
 
@@ -43,7 +44,7 @@ class _Search:
     table: bool
     ledger: Ledger
     fell: Counter[str]
-    timing: Counter[str]
+    timing: dict[str, float]
 
 
 class _Candidate(NamedTuple):
@@ -82,13 +83,20 @@ def localize(
     reason = "" if poses else _why_none(search, parts, hypotheses)
     progress.report(1.0, f"{len(poses)} poses found")
     return LocateResult(
-        tuple(poses), search.edges, tuple(hypotheses[:SHOWN]), search.ledger.entries, dict(search.timing), dict(search.fell), reason, progress.cancelled
+        tuple(poses),
+        search.edges,
+        tuple(hypotheses[:SHOWN]),
+        search.ledger.entries,
+        search.timing,
+        dict(search.fell),
+        reason,
+        progress.cancelled,
     )
 
 
 def _look(view: DepthView, options: LocateOptions) -> _Search:
     """Edges and evidence of a view."""
-    timing: Counter[str] = Counter()
+    timing: dict[str, float] = dict.fromkeys(STAGES, 0.0)
     start = time.perf_counter()
     surface = surface_of(view)
     pixels = edge_pixels(view, surface)
@@ -208,14 +216,14 @@ def _objection(
         return "as many poses as asked for were found", len(instances), options.max_poses, ""
     moved = min((displacement(T, pose.T_sensor_part, part) for pose in instances), default=np.inf)
     if moved < 0.1 * part.solid.diameter:
-        return "the same as a better pose", 1e3 * moved, 1e2 * part.solid.diameter, "mm"
+        return "the same as a better pose", moved, 0.1 * part.solid.diameter, "m"
     claimed = float(verdict.taken[0] / max(verdict.on[0], 1e-12))
     if claimed > 0.3:
         return "its surface is explained by a better pose", claimed, 0.3, ""
     depth = _below_table(search, candidate)
     allowed = 6.0 * search.view.noise + 0.5 * search.view.outline_error
     if depth > allowed:
-        return "it would stand below the table", 1e3 * depth, 1e3 * allowed, "mm"
+        return "it would stand below the table", depth, allowed, "m"
     if verdict.visible_fraction[0] < options.min_visible_fraction:
         return "too little of it is seen", float(verdict.visible_fraction[0]), options.min_visible_fraction, ""
     if verdict.surface_share[0] < options.min_surface_share:

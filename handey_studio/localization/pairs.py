@@ -1,6 +1,5 @@
 """Pairs of edges by their relative pose α, d, a₁, a₂ (Handey 1987 §3, Figure 3): the model's table, and the data's pairs."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -31,7 +30,8 @@ class ModelEdges(NamedTuple):
 
 class DataLines(NamedTuple):
     """The data edges as arrays, in the sensor's frame: `middle`, unit `direction` (n, 3), `half` length (n,) [m], `kind`
-    (n,), up to two flanks each: normals `flank` (n, 2, 3) and `side` (n, 2), +1 if that surface is left of the direction, −1 right, 0 none."""
+    (n,), up to two flanks each: normals `flank` (n, 2, 3) and `side` (n, 2), +1 if that surface is left of the direction,
+    −1 right, 0 none."""
 
     middle: NDArray
     direction: NDArray

@@ -30,7 +30,9 @@ class Weights(NamedTuple):
 
 def weights_of(view: DepthView, pixel: float) -> Weights:
     """From the view's noise and outline error and the size of a pixel [m]."""
-    return Weights(2.0 * view.noise, view.noise + 0.5 * view.outline_error, 0.5 * pixel + 0.2 * view.outline_error, 0.5 * view.outline_error)
+    return Weights(
+        2.0 * view.noise, view.noise + 0.5 * view.outline_error, 0.5 * pixel + 0.2 * view.outline_error, 0.5 * view.outline_error
+    )
 
 
 def refine(
@@ -74,7 +76,7 @@ def _faces(R, t, samples, evidence, limits, sigma, A, g):
         seen, behind, j, i = reading_at(x, y, z, evidence, limits)
         if seen != ON or evidence.taken[j, i]:
             continue
-        rx, ry, rz = ray_at(x, y, z, evidence.camera)
+        rz = ray_at(x, y, z, evidence.camera)[2]
         residual = -behind / rz * cosine  # of the reading from the face, along its outward normal
         _row(row, _dot(R, 0, normal), _dot(R, 1, normal), _dot(R, 2, normal), px, py, pz)
         _add(A, g, row, residual, sigma)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from handey_studio.base import Value, frozen_array
-from handey_studio.localization.edges import CONCAVE, CONVEX, JUMP, KIND_NAMES, EdgePixels
+from handey_studio.localization.edges import JUMP, KIND_NAMES, EdgePixels
 from handey_studio.localization.surface import Surface
 from handey_studio.sensing.depth_view import DepthView
 
@@ -155,7 +155,9 @@ def _flanks(surface: Surface, edges: EdgePixels, kind: int, u: NDArray, v: NDArr
 
 
 @njit(cache=True)
-def _directions(number: NDArray, u: NDArray, v: NDArray, kind: NDArray, depth: NDArray, gate: float, radius: int) -> tuple[NDArray, NDArray]:
+def _directions(
+    number: NDArray, u: NDArray, v: NDArray, kind: NDArray, depth: NDArray, gate: float, radius: int
+) -> tuple[NDArray, NDArray]:
     """Direction [rad] of each edge pixel's neighbourhood in the image, and how much it is a line: length times straightness."""
     height, width = number.shape
     theta, quality = np.zeros(len(u)), np.zeros(len(u))

@@ -58,8 +58,8 @@ def _normals(view: DepthView, points: NDArray, slope: NDArray) -> NDArray:
     height, width = view.depth.shape
     v, u = np.mgrid[:height, :width].astype(float)
     uv = np.stack([u, v], axis=-1)
-    along_u = view.projection.unproject(uv + (1.0, 0.0), view.depth + slope[..., 0]) - points
-    along_v = view.projection.unproject(uv + (0.0, 1.0), view.depth + slope[..., 1]) - points
+    along_u = view.projection.unproject(uv + np.array([1.0, 0.0]), view.depth + slope[..., 0]) - points
+    along_v = view.projection.unproject(uv + np.array([0.0, 1.0]), view.depth + slope[..., 1]) - points
     normals = np.cross(along_v, along_u)
     return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 

@@ -115,7 +115,7 @@ def edge_state(R, t, k, samples, evidence, limits):
         ix, iy, iz = _dot(R, 0, into), _dot(R, 1, into), _dot(R, 2, into)
         flanks += 1
         seen = reading_at(x + inset * ix, y + inset * iy, z + inset * iz, evidence, limits)[0]
-        if seen == ON or seen == THROUGH:
+        if seen in (ON, THROUGH):
             state = 0
     if state < 0:
         return -1, -1
@@ -134,7 +134,7 @@ def edge_state(R, t, k, samples, evidence, limits):
             return 1, edge
     beyond = limits.outside + evidence.pixel
     seen = reading_at(x - beyond * ix, y - beyond * iy, z - beyond * iz, evidence, limits)[0]
-    return (2 if seen == THROUGH or seen == UNKNOWN else 0), -1
+    return (2 if seen in (THROUGH, UNKNOWN) else 0), -1
 
 
 @njit(cache=True)
@@ -163,7 +163,7 @@ def _verify(R, t, samples, evidence, limits, every):
                 continue
             seen, _, j, i = reading_at(x, y, z, evidence, limits)
             rim = samples.face_rim[k] * cosine < limits.edge + 0.5 * evidence.pixel
-            if rim and (seen == THROUGH or seen == UNKNOWN):
+            if rim and seen in (THROUGH, UNKNOWN):
                 continue  # the margin that sensors lose at silhouettes
             if seen == UNKNOWN and cosine < STEEP:
                 seen = HIDDEN  # too steep to blame the part for the missing reading

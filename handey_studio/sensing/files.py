@@ -61,7 +61,9 @@ def _reading(path: Path, depth: NDArray, pinhole: Pinhole, camera: dict[str, Any
     depth = np.where(np.isfinite(depth) & (depth > 0) & (depth <= MAX_DEPTH_M), depth, np.nan)
     readings = int(np.isfinite(depth).sum())
     if readings < MIN_READINGS:
-        raise BadInput(f'depth file "{path}" has {readings} readings between 0 and {MAX_DEPTH_M:.0f} m; at least {MIN_READINGS} are needed.')
+        raise BadInput(
+            f'depth file "{path}" has {readings} readings between 0 and {MAX_DEPTH_M:.0f} m; at least {MIN_READINGS} are needed.'
+        )
     for key, size in (("width", depth.shape[1]), ("height", depth.shape[0])):
         if key in camera and _number(camera, key) != size:
             raise BadInput(f'depth file "{path}" is {depth.shape[1]} × {depth.shape[0]} px, but its camera says {key} {camera[key]}.')
