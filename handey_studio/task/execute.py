@@ -13,7 +13,7 @@ from handey_studio.world import Held, PlacedPart, World, arm_of
 
 GRIP_TOLERANCE_M = 0.0025  # the fingers' width on a part may differ from the model's by this much
 EARLY_M = 0.004  # contact this far above the commanded pose is something else than the support
-SEARCH_M = 0.006  # and this far below it the guarded descent still looks for the support
+SEARCH_M = 0.0015  # and this far below it the guarded descent still looks for the support: what the certificate lets touching bodies overlap
 GUARDED_SPEED = 0.25
 
 
@@ -80,7 +80,7 @@ def _place(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell) -
     if moved.contact:
         return "" if height <= EARLY_M else f"contact {1e3 * height:.1f} mm above the destination, limit {1e3 * EARLY_M:.1f} mm"
     T_world_hand = arm_of(carried.robot).hand_pose(moved.q_rad)
-    poses = np.repeat(T_world_hand[None], 7, axis=0)
+    poses = np.repeat(T_world_hand[None], 4, axis=0)
     poses[:, 2, 3] -= np.linspace(0.0, SEARCH_M, len(poses))
     deeper = straight_path(carried, moved.q_rad, poses, plan.grasp.width, held, step.allowed_contacts)
     if deeper.found:

@@ -22,11 +22,12 @@ from handey_studio.grasping import (
 )
 from handey_studio.task.options import Option
 from handey_studio.task.plan import GraspChoice
-from handey_studio.world import World, arm_of
+from handey_studio.world import FINGERS, World, arm_of
 from handey_studio.world.collision import collision_model
 
 ANGLES_PER_GROUP = 2
 STANDOFFS_M = (0.08, 0.05)  # the approach starts with the fingertips this far in front of the grasp point
+CLOSED_MARGIN_M = 1e-4  # fingers that close on a part keep this from all else; what stands beside the part is that near
 MIN_JOINT_MARGIN_RAD = np.deg2rad(3.0)
 
 
@@ -109,14 +110,25 @@ def _approached(option: Option, rotations: LegalRotations, angle: float, side: i
     back = _straight_back(final, side)
     hands = option.T_world_start @ T_part_plane @ in_plane
     retreat = option.goal.T_world_goal @ T_part_plane @ back
-    for where, world, T in (("pickup", option.goal.at_start, hands[-1]), ("putdown", option.goal.at_goal, retreat[0])):
-        clearance = collision_model(world).hand_contact(T, opening_around(hand, group.grasp_class.width))
-        if clearance.distance < HAND_MARGIN_M:
-            ledger.fall(entry, f"the hand, turned by the approach, collides at the {where}", value=clearance.distance,
-                        limit=HAND_MARGIN_M, unit="m", bodies=clearance.bodies)  # fmt: skip
-            return None
+    if _blocked(option, hands[-1], retreat[0], entry, ledger):
+        return None
     choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), area)
     return Grasp(option, choice, run, hands, retreat, entry)
+
+
+def _blocked(option: Option, T_world_pickup: NDArray, T_world_putdown: NDArray, entry: int, ledger: Ledger) -> bool:
+    """Whether the hand meets something at either end where the approach has led it, open around the part or closed on it."""
+    goal, width = option.goal, option.group.grasp_class.width
+    touching = finger_pairs(goal.instance.name)
+    opening = opening_around(goal.at_start.robot.hand, width)
+    for where, world, T in (("pickup", goal.at_start, T_world_pickup), ("putdown", goal.at_goal, T_world_putdown)):
+        for how, apart, pairs, margin in (("open", opening, (), HAND_MARGIN_M), ("closed", width, touching, CLOSED_MARGIN_M)):
+            clearance = collision_model(world).hand_contact(T, apart, allowed=pairs)
+            if clearance.distance < margin:
+                ledger.fall(entry, f"the {how} hand collides at the {where}", value=clearance.distance, limit=margin, unit="m",
+                            bodies=clearance.bodies)  # fmt: skip
+                return True
+    return False
 
 
 def approach_run(end: GraspEnd, option: Option, angle: float) -> BumpRun:
@@ -166,6 +178,11 @@ def _choice(
 
 def _in_part(T_part_plane: NDArray, points: NDArray) -> NDArray:
     return points @ T_part_plane[:3, 1:3].T + T_part_plane[:3, 3]
+
+
+def finger_pairs(name: str) -> tuple[tuple[str, str], ...]:
+    """The fingers may touch the part that they take."""
+    return tuple((finger, name) for finger in FINGERS)
 
 
 def reachable(world: World, T_world_hand: NDArray, opening: float, near: NDArray, where: str, entry: int, ledger: Ledger) -> list[NDArray]:

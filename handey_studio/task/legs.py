@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Value, frozen_array
 from handey_studio.motion import Certificate, PathResult, certify, plan_path, straight_path, time_path
-from handey_studio.task.grasp_search import Grasp, reachable
+from handey_studio.task.grasp_search import CLOSED_MARGIN_M, Grasp, finger_pairs, reachable
 from handey_studio.task.plan import MovePlan, Step, StepKind
-from handey_studio.world import FINGERS, Held, PlacedPart, World
+from handey_studio.world import Held, PlacedPart, World
 from handey_studio.world.support import neighbours
 
 Pairs = tuple[tuple[str, str], ...]
@@ -73,10 +73,6 @@ def held_part(grasp: Grasp) -> Held:
 def support_pairs(world: World, placed: PlacedPart) -> Pairs:
     """The bodies that a standing part may touch while it is lifted from there or put down there."""
     return tuple((placed.name, neighbour.name) for neighbour in neighbours(world.without(placed.name), placed))
-
-
-def finger_pairs(name: str) -> Pairs:
-    return tuple((finger, name) for finger in FINGERS)
 
 
 def _pickup_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
@@ -172,7 +168,9 @@ def _steps(
     ]
     paths = {1: there, 2: pickup.towards, 4: pickup.away, 5: transfer, 6: putdown.towards, 8: putdown.away, 9: home}
     certificates = [
-        paths[k].certificate or _unproved() if k in paths else certify(world, np.repeat(q, 2, axis=0), np.array(openings), None, pairs)
+        paths[k].certificate or _unproved()
+        if k in paths
+        else certify(world, np.repeat(q, 2, axis=0), np.array(openings), None, pairs, CLOSED_MARGIN_M)
         for k, (_, world, q, openings, _, pairs) in enumerate(rows)
     ]
     return tuple(_step(goal.at_start, *row) for row in rows), worst(certificates)

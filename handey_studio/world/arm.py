@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import import_module
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,20 +15,24 @@ from handey_studio.geometry.transforms import inverse
 from handey_studio.world.ik import IK_SOLVERS
 from handey_studio.world.robot import Robot
 
-
 pin: Any = import_module("pinocchio")  # compiled, without type information
+
+
+FULL_SHARE = 0.8  # a link that fills this share of its hull is taken for it
+SLICES = 4
 
 
 @dataclass(frozen=True)
 class LinkBody:
     """A link's collision geometry. `link` counts the moving links: 0 is the fixed base, i is what joint i carries.
 
-    `hull` (n, 3) [m] are the corners of its convex hull in the link's frame, `vertices` and `triangles` its exact mesh.
+    `hulls`, each (n, 3) [m] in the link's frame, are the corners of convex pieces that together hold the link: its hull, or the hulls of
+    a few slices across its length where one hull would hold much air. `vertices` and `triangles` are its exact mesh.
     """
 
     name: str
     link: int
-    hull: NDArray
+    hulls: tuple[NDArray, ...]
     vertices: NDArray
     triangles: NDArray
 
@@ -136,14 +141,28 @@ def _link_body(geometry: Any) -> LinkBody:
     else:
         mesh = _primitive(geometry)
     mesh.apply_transform(geometry.placement.homogeneous)
-    hull = mesh.convex_hull
     return LinkBody(
         name=geometry.name.rsplit("_", 1)[0],
         link=geometry.parentJoint,
-        hull=frozen_array(hull.vertices),
+        hulls=_hulls(mesh),
         vertices=frozen_array(mesh.vertices),
         triangles=frozen_array(mesh.faces, int),
     )
+
+
+def _hulls(mesh: trimesh.Trimesh) -> tuple[NDArray, ...]:
+    """Convex pieces that hold a mesh."""
+    whole = mesh.convex_hull
+    if not mesh.is_watertight or mesh.volume > FULL_SHARE * whole.volume:
+        return (frozen_array(whole.vertices),)
+    axis = np.eye(3)[int(np.argmax(mesh.extents))]
+    cuts = np.linspace(*(mesh.bounds @ axis), SLICES + 1)
+    pieces = []
+    for low, high in pairwise(cuts):
+        piece = trimesh.intersections.slice_mesh_plane(mesh, axis, axis * low)
+        piece = trimesh.intersections.slice_mesh_plane(piece, -axis, axis * high)
+        pieces.append(frozen_array(piece.convex_hull.vertices))
+    return tuple(pieces)
 
 
 def _primitive(geometry: Any) -> trimesh.Trimesh:

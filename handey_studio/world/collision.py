@@ -188,11 +188,10 @@ class CollisionModel:
         return Clearance(float(found), names, float(depth), pair)
 
     def _depth(self, hit: Hit, bodies: Bodies, placing: Placing) -> float:
-        """How deep [m] two bodies overlap. A column is as wide as the map's cell, so there the depth is measured downwards."""
-        first = bodies.shapes.first
+        """How deep [m] two bodies overlap. A column is as narrow as the map's cell: many of them tell how deep a wide body stands."""
         if hit.kind == 1:
             column = self.terrain.corners[self.terrain.first[hit.other] : self.terrain.first[hit.other + 1]]
-            return max(0.0, float(column[:, 2].max() - placing.corners[first[hit.body] : first[hit.body + 1], 2].min()))
+            return penetration(bodies.fcl_object(hit.body, placing), fcl_box(column))
         mine = bodies.fcl_object(hit.body, placing)
         if hit.kind == 2:
             return penetration(mine, bodies.fcl_object(hit.other, placing))
@@ -211,6 +210,13 @@ def penetration(one: fcl.CollisionObject, other: fcl.CollisionObject) -> float:
     """Depth [m] that two convex bodies overlap by: the least shift that parts them, as FCL finds it; 0 when apart."""
     request, result = fcl.DistanceRequest(enable_signed_distance=True), fcl.DistanceResult()
     return max(0.0, -fcl.distance(one, other, request, result))
+
+
+def fcl_box(corners: NDArray) -> fcl.CollisionObject:
+    """A cuboid from its corners (8, 3) [m], in the order in which z changes fastest and x slowest."""
+    sides = corners[[4, 2, 1]] - corners[0]
+    lengths = np.linalg.norm(sides, axis=1)
+    return fcl.CollisionObject(fcl.Box(*lengths), fcl.Transform((sides / lengths[:, None]).T, corners.mean(axis=0)))
 
 
 def fcl_convex(corners: NDArray) -> fcl.Convex:

@@ -14,7 +14,7 @@ from handey_studio.world.part import Held
 from handey_studio.world.robot import Robot
 from handey_studio.world.world import World
 
-COLUMN_M = 0.003  # columns finer than this are made coarser, the highest wins: half a finger's clearance at most
+COLUMN_M = 0.001  # columns finer than this are made coarser, the highest wins: coarse ones would reach into what stands beside them
 TABLE_SKIN_M = 0.0015  # readings up to this far above the table are the table's own, seen through the sensor's noise
 SOLID_M = 2.0  # thickness of the table and of the space outside: more than any arm reaches through
 DEPTH_MAP, TABLE, OUTSIDE = "depth map", "table", "outside"
@@ -57,7 +57,7 @@ class Piece(NamedTuple):
 def robot_pieces(robot: Robot) -> list[Piece]:
     """The links' hulls and the hand's boxes with the fingers closed."""
     arm = arm_of(robot)
-    links = [Piece(body.name, body.link, body.hull, np.zeros(3)) for body in arm.bodies]
+    links = [Piece(body.name, body.link, hull, np.zeros(3)) for body in arm.bodies for hull in body.hulls]
     closed, apart = hand_hulls(robot, 0.0), hand_hulls(robot, 1.0)
     turn = arm.T_last_hand[:3, :3]
     hand = [

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import apply
-from handey_studio.world.collision import fcl_convex, penetration
+from handey_studio.world.collision import fcl_box, fcl_convex, penetration
 from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, columns_of, solids_of
 from handey_studio.world.gjk import distance
 from handey_studio.world.part import PlacedPart
@@ -48,7 +48,5 @@ def _gap(name: str, piece: NDArray, corners: NDArray) -> float:
     apart = distance(np.ascontiguousarray(piece), 0, len(piece), np.ascontiguousarray(corners), 0, len(corners), 1e-9)
     if apart > 0:
         return float(apart)
-    # A column is as narrow as the map's cell: how deep the part stands in it counts downwards.
-    if name == DEPTH_MAP:
-        return float(piece[:, 2].min() - corners[:, 2].max())
-    return -penetration(*(fcl.CollisionObject(fcl_convex(body)) for body in (piece, corners)))
+    other = fcl_box(corners) if name == DEPTH_MAP else fcl.CollisionObject(fcl_convex(corners))
+    return -penetration(fcl.CollisionObject(fcl_convex(piece)), other)
