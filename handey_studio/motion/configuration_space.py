@@ -16,8 +16,9 @@ from handey_studio.base import Value, frozen_array
 from handey_studio.motion.certificate import Mover
 from handey_studio.motion.distance_field import Field, clearance_at, distance_field
 from handey_studio.motion.wrist_box import ArmSpheres
+from handey_studio.world.bounding_tree import box_gap
 from handey_studio.world.collision_bodies import Shapes
-from handey_studio.world.collision_queries import Chain, body_distance, forward, placed
+from handey_studio.world.collision_queries import Chain, body_distance, bounds, forward, placed
 
 TURN = 2 * np.pi
 REACH = 0.75 * TURN  # the way round the other side, and a quarter turn to spare
@@ -180,7 +181,10 @@ def _assemble(
 
 @njit(cache=True)
 def _self_blocked(chain: Chain, shapes: Shapes, opening: float, values2: NDArray, values3: NDArray, wrist: NDArray) -> NDArray:
-    """Cells (n2, n3) in whose centre, with the wrist where it is, the arm's own bodies meet. Joint 1 does not matter."""
+    """Cells (n2, n3) in whose centre, with the wrist where it is, one of the first two links or the base meets what comes after it.
+
+    Joint 1 does not matter.
+    """
     blocked = np.zeros((len(values2), len(values3)), np.bool_)
     q = np.zeros(3 + len(wrist))
     q[3:] = wrist
@@ -188,9 +192,12 @@ def _self_blocked(chain: Chain, shapes: Shapes, opening: float, values2: NDArray
         for m in range(len(values3)):
             q[1], q[2] = values2[j], values3[m]
             corners = placed(shapes, forward(chain, q), opening)
+            spans = bounds(shapes, corners)
             for pair in range(len(shapes.pairs)):
                 a, b = int(shapes.pairs[pair, 0]), int(shapes.pairs[pair, 1])
-                if shapes.link[a] <= 3 and body_distance(shapes, corners, a, b, 1e-4) <= 0.0:
+                if shapes.link[a] >= 3 or box_gap(spans[a, 0], spans[a, 1], spans[b, 0], spans[b, 1]) > 0.0:
+                    continue
+                if body_distance(shapes, corners, a, b, 1e-4) <= 0.0:
                     blocked[j, m] = True
                     break
     return blocked

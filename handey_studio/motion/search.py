@@ -5,7 +5,6 @@ import heapq
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from handey_studio.motion.configuration_space import ConfigurationSpace
 
@@ -33,11 +32,23 @@ def regions_by_distance(space: ConfigurationSpace, q_start: NDArray, q_goal: NDA
     least = []
     for q in (q_start, q_goal):
         a, b, c = ((centres - angle) ** 2 for centres, angle in zip(space.centres, np.asarray(q)[:3], strict=True))
-        squares = a[:, None, None] + b[None, :, None] + c[None, None, :]
-        least.append(np.sqrt(np.asarray(ndimage.minimum(squares, space.regions, np.arange(1, count + 1)))))
+        least.append(np.sqrt(_least_squares(np.array(space.regions), count, a, b, c)))
     total = least[0] + least[1]
     order = np.argsort(total, kind="stable")
     return [int(k) + 1 for k in order[:most]]
+
+
+@njit(cache=True)
+def _least_squares(regions: NDArray, count: int, a: NDArray, b: NDArray, c: NDArray) -> NDArray:
+    """The least a[i] + b[j] + c[k] among the cells of each region."""
+    least = np.full(count, np.inf)
+    for i in range(len(a)):
+        for j in range(len(b)):
+            for k in range(len(c)):
+                number = regions[i, j, k]
+                if number > 0:
+                    least[number - 1] = min(least[number - 1], a[i] + b[j] + c[k])
+    return least
 
 
 def find_cells(blocked: NDArray, start: tuple[int, int, int], goal: tuple[int, int, int]) -> NDArray:
