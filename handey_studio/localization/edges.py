@@ -54,7 +54,7 @@ def edge_pixels(view: DepthView, surface: Surface) -> EdgePixels:
 
 def _noise_growth(view: DepthView) -> NDArray:
     """How much noisier each reading is than the view's typical one: triangulated depth degrades with its square."""
-    if isinstance(view.projection, Pinhole):
+    if isinstance(view.projection, Pinhole) and np.isfinite(view.depth).any():
         return np.maximum((view.depth / np.nanmedian(view.depth)) ** 2, 0.5)
     return np.ones(view.depth.shape)
 

@@ -21,7 +21,7 @@ class PartSamples(NamedTuple):
 
     Edges: `edge_point` (n, 3), its number `edge` (n,) in the table of model edges, unit `along`, normals `left`, `right`
     (n, 3), directions `into_left`, `into_right` (n, 3) from the edge into its faces, and `edge_weight` (n,) [m], the
-    length it stands for. Faces: `face_point`, `face_normal` (m, 3) `face_weight` (m,) [m²]
+    length it stands for; whether it is `concave` (n,). Faces: `face_point`, `face_normal` (m, 3) `face_weight` (m,) [m²]
     and `face_rim` (m,) [m], how far it is from the nearest edge.
     """
 
@@ -33,6 +33,7 @@ class PartSamples(NamedTuple):
     into_left: NDArray
     into_right: NDArray
     edge_weight: NDArray
+    concave: NDArray
     face_point: NDArray
     face_normal: NDArray
     face_weight: NDArray
@@ -53,7 +54,9 @@ def part_samples(part: Part, density: int = 1) -> PartSamples:
     face_point, face_normal, face_weight = _face_samples(part, density * FACE_SAMPLES)
     into_left, into_right = np.cross(left, along), -np.cross(right, along)
     rim = _distance_to_edges(face_point, edges)
-    return PartSamples(points, number, along, left, right, into_left, into_right, weight, face_point, face_normal, face_weight, rim)
+    return PartSamples(
+        points, number, along, left, right, into_left, into_right, weight, edges.concave[number], face_point, face_normal, face_weight, rim
+    )
 
 
 def _distance_to_edges(points: NDArray, edges: ModelEdges) -> NDArray:

@@ -36,7 +36,8 @@ class Surface(Value):
 
 def surface_of(view: DepthView) -> Surface:
     """Normals by least squares in a window that leaves out what lies across a jump."""
-    pixel = float(1.0 / view.projection.pixels_per_metre(float(np.nanmedian(view.depth))))
+    readings = view.depth[np.isfinite(view.depth)]
+    pixel = float(1.0 / view.projection.pixels_per_metre(float(np.median(readings)) if len(readings) else 1.0))
     radius = window_radius(view.noise, pixel)
     step = 2 if radius >= 5 else 1
     metres = np.asarray(1.0 / view.projection.pixels_per_metre(view.depth))

@@ -69,7 +69,8 @@ def oblique_view(
     noisy = depth + rng.normal(0.0, noise, depth.shape) * (depth / np.nanmedian(depth)) ** 2
     far = np.where(np.isfinite(depth), depth, np.inf)
     beside = np.max([np.roll(far, shift, axis) for shift, axis in ((1, 0), (-1, 0), (1, 1), (-1, 1))], axis=0)
-    noisy[(beside - far > 0.01) & (rng.random(depth.shape) < 0.6)] = np.nan
+    edge_of_surface = np.isfinite(far) & (beside - np.where(np.isfinite(far), far, 0.0) > 0.01)
+    noisy[edge_of_surface & (rng.random(depth.shape) < 0.6)] = np.nan
     noisy[rng.random(depth.shape) < dropped] = np.nan
     return DepthView(noisy, pinhole, T_world_sensor, noise=noise, outline_error=0.002)
 
