@@ -12,6 +12,7 @@ from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.session import Session
 from handey_studio.session.destination import check_command, destination_pose, destinations_on_parts, snapped
+from handey_studio.session.looking import edge_at
 from handey_studio.task.destination import format_pose
 from handey_studio.task.plan import MoveCommand
 
@@ -189,6 +190,31 @@ class Select:
         if self.kind == "result":
             state = with_view(state, time_s=0.0)
         return with_view(state, **{self.kind: self.number})
+
+
+@dataclass(frozen=True, eq=False)
+class PointAt:
+    """A click into the scene along a ray: it looks at the data edge there, if one is shown there."""
+
+    origin: NDArray
+    direction: NDArray
+
+    def apply(self, state: State) -> State:
+        scene = state.session.scene
+        if scene is None or "data edges" in state.session.view.hidden_layers:
+            return state
+        number = edge_at(scene.located.edges, self.origin, self.direction)
+        return state if number < 0 else Select("edge", number).apply(state)
+
+
+@dataclass(frozen=True)
+class ResetCell:
+    """The cell as it was before the first MOVE, and nothing sensed or planned."""
+
+    def apply(self, state: State) -> State:
+        if state.job is not None:
+            raise BadInput("the planner is at work; cancel first or wait for it.")
+        return replace(state, session=state.session.without_findings(), playing=False)
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,8 @@ class View:
     def __init__(self, server: viser.ViserServer, send: Send) -> None:
         self._server = server
         server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
-        scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server)]
-        scenes += [DestinationScene(server, send), SensingScene(server), PlanScene(server)]
+        scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server, send)]
+        scenes += [DestinationScene(server, send), SensingScene(server, send), PlanScene(server)]
         session = SessionPanel(server, send)
         self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()

@@ -35,6 +35,16 @@ def on_click(handle: Any, send: Send, make: Callable[[Any], Any]) -> None:
     handle.on_click(pressed)
 
 
+def on_scene_click(server: viser.ViserServer, send: Send, make: Callable[[Any], Any]) -> None:
+    """Send `make(event)` when a user clicks into the scene."""
+
+    async def clicked(event: Any) -> None:
+        send(make(event))
+
+    handler: Any = clicked  # viser awaits it; its annotation speaks of plain functions only
+    server.scene.on_click()(handler)
+
+
 def on_upload(handle: Any, send: Send, make: Callable[[Any], Any]) -> None:
     """Send `make(event)` when a file has arrived."""
 

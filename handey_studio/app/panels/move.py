@@ -7,7 +7,7 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove, StartMove
-from handey_studio.app.commands import POSE_LABEL, ChoosePart, FreePose, Redo, SetDestination, SetSeed, Undo
+from handey_studio.app.commands import POSE_LABEL, ChoosePart, FreePose, Redo, ResetCell, SetDestination, SetSeed, Undo
 from handey_studio.app.guidance import next_step
 from handey_studio.app.scene.destination import ghost_pose
 from handey_studio.app.state import State
@@ -37,6 +37,7 @@ class MovePanel:
         self._redo = gui.add_button("Redo", icon=viser.Icon.ARROW_FORWARD_UP, disabled=True)
         with gui.add_folder("Options", expand_by_default=False):
             self._seed = gui.add_number("Seed", 0, min=0, max=2**31 - 1, step=1, hint="The same seed gives the same plan")
+            self._reset = gui.add_button("Reset the cell", icon=viser.Icon.REFRESH, color="gray", hint="As it was before the first MOVE")
         self._wire(send)
 
     def _wire(self, send: Send) -> None:
@@ -49,6 +50,7 @@ class MovePanel:
         on_click(self._move, send, lambda _: StartMove(execute=True))
         on_click(self._cancel, send, lambda _: CancelMove())
         on_click(self._undo, send, lambda _: Undo())
+        on_click(self._reset, send, lambda _: ResetCell())
         on_click(self._redo, send, lambda _: Redo())
 
     def _typed(self) -> SetDestination:

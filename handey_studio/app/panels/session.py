@@ -9,7 +9,7 @@ from handey_studio.app.actions import DownloadSession, NewSession, OpenSession, 
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_upload
 
-BUTTONS = ("New", "Open", "Save", "Save as", "Download")
+BUTTONS = (("Session", ("New", "Open", "Save")), ("Copy", ("Save as", "Download")))
 
 
 class SessionPanel:
@@ -20,7 +20,8 @@ class SessionPanel:
         self._server, self._send = server, send
         self._state: State | None = None
         self._about = gui.add_html("")
-        on_click(gui.add_button_group("", BUTTONS), send, self._pressed)
+        for label, choices in BUTTONS:
+            on_click(gui.add_button_group(label, choices), send, self._pressed)
 
     def _pressed(self, event: Any) -> Any:
         choice = event.target.value

@@ -23,8 +23,8 @@ class TimelinePanel:
         panel = gui.add_panel()
         with panel.add_tab("Timeline", viser.Icon.MOVIE):
             self._strip = gui.add_html("")
-            self._slider = gui.add_slider("Time (s)", min=0.0, max=1.0, step=0.01, initial_value=0.0, disabled=True)
-            self._buttons = gui.add_button_group("Play", (FIRST, BACK, PLAY, ON, LAST, *SPEEDS))
+            self._slider = gui.add_slider("Time (s)", min=0.0, max=1.0, step=0.01, initial_value=0.0, visible=False)
+            self._buttons = gui.add_button_group("Play", (FIRST, BACK, PLAY, ON, LAST, *SPEEDS), visible=False)
         panel.float(x=14, y=-14, width=WIDTH)
         on_user(self._slider, send, lambda event: Seek(float(event.target.value)))
         on_click(self._buttons, send, _pressed)
@@ -34,7 +34,8 @@ class TimelinePanel:
             return
         replay = new.replay
         time_s = new.session.view.time_s
-        set_to(self._slider, disabled=replay is None)
+        set_to(self._slider, visible=replay is not None)
+        set_to(self._buttons, visible=replay is not None)
         if replay is not None:
             set_to(self._slider, max=round(replay.duration, 2))
         set_to(self._slider, value=round(min(time_s, self._slider.max), 2))

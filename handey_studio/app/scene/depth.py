@@ -8,39 +8,42 @@ from handey_studio.app.palette import elevation_colours
 from handey_studio.app.scene.units import scaled
 from handey_studio.app.state import State
 from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.session.looking import unexplained
 
 MAX_POINTS = 50_000
 MIN_SPAN_M = 0.02  # an empty table is not blown up to mountains of noise
 
 
 class DepthScene:
-    """One point cloud, replaced when the scan changes."""
+    """One point cloud, replaced when the scan changes. Readings that a located part explains go when the part is drawn."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._cloud: viser.PointCloudHandle | None = None
 
     def render(self, old: State | None, new: State) -> None:
-        if old is None or old.session.scan is not new.session.scan:
-            self._draw(new.session.scan)
+        if old is None or _looks(old) != _looks(new):
+            self._draw(new)
         if self._cloud is not None:
             shown = "depth map" not in new.session.view.hidden_layers
             if self._cloud.visible != shown:
                 self._cloud.visible = shown
 
-    def _draw(self, scan: DepthMap | None) -> None:
+    def _draw(self, state: State) -> None:
         if self._cloud is not None:
             self._cloud.remove()
             self._cloud = None
-        if scan is None:
+        scene = state.session.scene
+        if scene is None:
             return
+        scan = scene.depth_map
+        left = unexplained(scene) if _parts_shown(state) else np.ones(scan.elevation.shape, dtype=bool)
         stride = stride_of(scan)
-        points, elevation = thinned(scan, stride)
-        colours = elevation_colours(elevation / elevation_span(scan))
+        points, elevation = thinned(scan, left, stride)
         self._cloud = self._server.scene.add_point_cloud(
             "/depth_map",
             scaled(points),
-            colours,
+            elevation_colours(elevation / elevation_span(scan)),
             point_size=float(scaled(scan.cell * stride * 1.1)),
             point_shape="square",
             precision="float32",
@@ -48,15 +51,23 @@ class DepthScene:
         )
 
 
+def _parts_shown(state: State) -> bool:
+    return "located parts" not in state.session.view.hidden_layers
+
+
+def _looks(state: State) -> tuple:
+    return id(state.session.scene), _parts_shown(state)
+
+
 def stride_of(scan: DepthMap) -> int:
     """Every how-many-th cell is shown, so that a slow browser copes."""
     return int(np.ceil(np.sqrt(max(1.0, scan.elevation.size / MAX_POINTS))))
 
 
-def thinned(scan: DepthMap, stride: int) -> tuple[NDArray, NDArray]:
-    """Points (n, 3) [m] in the world and their elevations (n,) [m]."""
+def thinned(scan: DepthMap, left: NDArray, stride: int) -> tuple[NDArray, NDArray]:
+    """Points (n, 3) [m] in the world and their elevations (n,) [m], of every `stride`-th cell that is `left`."""
     grid = scan.elevation[::stride, ::stride]
-    j, i = np.nonzero(np.isfinite(grid))
+    j, i = np.nonzero(np.isfinite(grid) & left[::stride, ::stride])
     points = np.c_[(i * stride + 0.5) * scan.cell, (j * stride + 0.5) * scan.cell, grid[j, i]]
     return points @ scan.T_world_range[:3, :3].T + scan.T_world_range[:3, 3], grid[j, i]
 

@@ -5,8 +5,10 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import palette
+from handey_studio.app.commands import ChoosePart
 from handey_studio.app.scene.units import place, scaled
 from handey_studio.app.state import State
+from handey_studio.app.wire import Send, on_click
 from handey_studio.world import Part
 
 ROOT = "/parts"
@@ -14,25 +16,27 @@ ROOT = "/parts"
 
 def add_solid(
     scene: viser.SceneApi, name: str, part: Part, colour: palette.RGB, T: NDArray, opacity: float | None = None
-) -> viser.FrameHandle:
-    """A frame at a pose with a part's faces and sharp edges below it."""
+) -> tuple[viser.FrameHandle, viser.MeshHandle]:
+    """A frame at a pose with a part's faces and sharp edges below it; the frame and the faces."""
     frame = scene.add_frame(name, show_axes=False)
     place(frame, T)
     solid = part.solid
     corners = solid.vertices[solid.triangles].reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
-    scene.add_mesh_simple(f"{name}/faces", scaled(corners), faces, color=colour, opacity=opacity, side="double" if opacity else "front")
+    mesh = scene.add_mesh_simple(
+        f"{name}/faces", scaled(corners), faces, color=colour, opacity=opacity, side="double" if opacity else "front"
+    )
     edges = np.array([[solid.vertices[edge.start], solid.vertices[edge.end]] for edge in solid.edges])
     dark = (int(0.55 * colour[0]), int(0.55 * colour[1]), int(0.55 * colour[2]))
     scene.add_line_segments(f"{name}/edges", scaled(edges), colors=dark, thickness=1.5, thickness_units="screen")
-    return frame
+    return frame, mesh
 
 
 class PartsScene:
     """One node for each located instance, and one for the moved part while a plan is looked at."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
+    def __init__(self, server: viser.ViserServer, send: Send) -> None:
+        self._server, self._send = server, send
         self._frames: dict[str, viser.FrameHandle] = {}
         self._labels: dict[str, viser.LabelHandle] = {}
 
@@ -50,7 +54,8 @@ class PartsScene:
         self._frames, self._labels = {}, {}
         for number, placed in enumerate(state.session.located):
             name = f"{ROOT}/{number}"
-            self._frames[placed.name] = add_solid(scene, name, placed.part, palette.ORANGE, placed.T_world_part)
+            self._frames[placed.name], faces = add_solid(scene, name, placed.part, palette.ORANGE, placed.T_world_part)
+            on_click(faces, self._send, lambda _, chosen=placed.name: ChoosePart(chosen))
             top = placed.part.solid.vertices.mean(axis=0)
             self._labels[placed.name] = scene.add_label(f"{name}/label", placed.name, position=scaled(top), font_screen_scale=0.75)
 

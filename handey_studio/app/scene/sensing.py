@@ -4,20 +4,25 @@ import numpy as np
 import viser
 
 from handey_studio.app import palette
+from handey_studio.app.commands import PointAt
 from handey_studio.app.scene.parts import add_solid
-from handey_studio.app.scene.units import scaled
+from handey_studio.app.scene.units import metres, scaled
 from handey_studio.app.state import State
+from handey_studio.app.wire import Send, on_scene_click
 from handey_studio.localization import Hypothesis
 
 EDGES, CHOSEN, HYPOTHESIS = "/sensed/edges", "/sensed/chosen_edge", "/sensed/hypothesis"
+LIFT_M = np.array([0.0, 0.0, 0.0012])  # drawn just above the readings, not among them
 KIND_COLOURS = {"jump": palette.VERMILLION, "convex": palette.INK, "concave": palette.GREY}
 
 
 class SensingScene:
     """All data edges as thin lines, the chosen one thick; one hypothesis as a translucent body with the edges that it came from."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    def __init__(self, server: viser.ViserServer, send: Send) -> None:
         self._server = server
+        self._edges: viser.LineSegmentsHandle | None = None
+        on_scene_click(server, send, lambda event: PointAt(metres(event.ray_origin), np.array(event.ray_direction)))
 
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
@@ -31,10 +36,11 @@ class SensingScene:
     def _draw_edges(self, state: State) -> None:
         scene = self._server.scene
         scene.remove_by_name("/sensed")
+        self._edges = None
         edges = state.session.scene.located.edges if state.session.scene else ()
         if edges:
             scene.add_frame("/sensed", show_axes=False)
-            ends = np.array([edge.ends_world for edge in edges])
+            ends = np.array([edge.ends_world for edge in edges]) + LIFT_M
             colours = np.array([KIND_COLOURS.get(edge.kind, palette.GREY) for edge in edges], dtype=np.uint8)
             colours = np.repeat(colours[:, None], 2, axis=1)
             self._edges = scene.add_line_segments(EDGES, scaled(ends), colors=colours, thickness=2.5, thickness_units="screen")
@@ -44,7 +50,7 @@ class SensingScene:
         scene.remove_by_name(CHOSEN)
         chosen = chosen_edges(state)
         if chosen:
-            ends = np.array([edge.ends_world for edge in chosen])
+            ends = np.array([edge.ends_world for edge in chosen]) + 2 * LIFT_M
             scene.add_line_segments(CHOSEN, scaled(ends), colors=palette.BLUE, thickness=7.0, thickness_units="screen")
 
     def _draw_hypothesis(self, state: State) -> None:
@@ -56,10 +62,9 @@ class SensingScene:
             add_solid(scene, HYPOTHESIS, part, palette.SKY, hypothesis.T_world_part, opacity=0.45)
 
     def _show(self, state: State) -> None:
-        if state.session.scene is not None and state.session.scene.located.edges:
-            shown = "data edges" not in state.session.view.hidden_layers
-            if self._edges.visible != shown:
-                self._edges.visible = shown
+        shown = "data edges" not in state.session.view.hidden_layers
+        if self._edges is not None and self._edges.visible != shown:
+            self._edges.visible = shown
 
 
 def chosen_hypothesis(state: State) -> Hypothesis | None:
