@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
@@ -46,7 +47,7 @@ class BumpLines(Value):
 class BumpRun(Value):
     """One run of the planner. `path` (k, 3): fingertip point y, z [m] and angle [rad] in the grasp plane, start first.
 
-    `status`: reached, stuck (no motion is left), or iterations (the limit was hit). `distance` [m] is what remained.
+    `status`: reached, stuck (no motion is left), or iterations (the limit was hit). `distance` [m] is what remained, `threshold` [m] what had to.
     """
 
     plane: GraspPlane
@@ -54,6 +55,7 @@ class BumpRun(Value):
     goal: NDArray
     status: Literal["reached", "stuck", "iterations", "blocked start"]
     distance: float
+    threshold: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "path", frozen_array(self.path))
@@ -97,7 +99,7 @@ def plan_approach(plane: GraspPlane, hand: Hand, start: NDArray, goal: NDArray, 
     goal = np.asarray(goal, dtype=float)
     status: Literal["reached", "stuck", "iterations", "blocked start"] = "iterations"
     if overlaps(plane, hand, pose):
-        return BumpRun(plane, np.array(path), goal, "blocked start", float(np.linalg.norm(goal - pose[:2])))
+        return BumpRun(plane, np.array(path), goal, "blocked start", float(np.linalg.norm(goal - pose[:2])), options.threshold)
     for _ in range(options.max_iterations):
         left = goal - pose[:2]
         distance = float(np.linalg.norm(left))
@@ -111,30 +113,44 @@ def plan_approach(plane: GraspPlane, hand: Hand, start: NDArray, goal: NDArray, 
             break
         pose = moved
         path.append(pose)
-    return BumpRun(plane, np.array(path), goal, status, float(np.linalg.norm(goal - pose[:2])))
+    return BumpRun(plane, np.array(path), goal, status, float(np.linalg.norm(goal - pose[:2])), options.threshold)
 
 
 def colliding_lines(plane: GraspPlane, lines: BumpLines, pose: NDArray) -> NDArray:
     """Which bump lines (m,) cross a filled cell when the hand is at a pose (y, z, angle)."""
-    shares = np.linspace(0.0, 1.0, 1 + int(np.ceil(0.15 / plane.cell)))[:, None]
-    points = lines.ends[:, None, 0] * (1 - shares) + lines.ends[:, None, 1] * shares
-    in_plane = points @ _hand_axes(pose[2]) + pose[:2]
-    fingers = np.array([volume == "fingers" for volume in lines.volumes])
-    hit = np.empty(len(fingers), dtype=bool)
-    hit[fingers] = plane.is_filled("fingers", in_plane[fingers]).any(axis=1)
-    hit[~fingers] = plane.is_filled("crosspiece", in_plane[~fingers]).any(axis=1)
-    return hit
+    return np.array(
+        [
+            _meets_filled(_grid(plane, volume), plane.origin, plane.cell, pose, *ends.min(axis=0), *ends.max(axis=0))
+            for volume, ends in zip(lines.volumes, lines.ends, strict=True)
+        ]
+    )
 
 
 def overlaps(plane: GraspPlane, hand: Hand, pose: NDArray) -> bool:
     """Whether the hand itself lies in a filled cell at a pose (y, z, angle)."""
-    axes = _hand_axes(pose[2])
-    for volume, w, low, high in hand_rectangles(hand):
-        across = np.linspace(-w, w, 1 + int(np.ceil(2 * w / plane.cell)))
-        along = np.linspace(low, high, 1 + int(np.ceil((high - low) / plane.cell)))
-        points = np.stack(np.meshgrid(across, along), axis=-1).reshape(-1, 2)
-        if plane.is_filled(volume, points @ axes + pose[:2]).any():
-            return True
+    return any(
+        _meets_filled(_grid(plane, volume), plane.origin, plane.cell, pose, -w, low, w, high)
+        for volume, w, low, high in hand_rectangles(hand)
+    )
+
+
+def _grid(plane: GraspPlane, volume: str) -> NDArray:
+    return plane.fingers if volume == "fingers" else plane.crosspiece
+
+
+@njit(cache=True)
+def _meets_filled(grid: NDArray, origin: NDArray, cell: float, pose: NDArray, a0: float, b0: float, a1: float, b1: float) -> bool:
+    """Whether a rectangle of the hand's frame, a0 ≤ across ≤ a1 and b0 ≤ along ≤ b1 (a line if flat), meets a filled cell or the border."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    columns, rows = 1 + int(np.ceil((a1 - a0) / cell)), 1 + int(np.ceil((b1 - b0) / cell))
+    for k in range(columns):
+        a = a0 + (a1 - a0) * k / max(columns - 1, 1)
+        for m in range(rows):
+            b = b0 + (b1 - b0) * m / max(rows - 1, 1)
+            i = int(np.floor((pose[0] - s * a + c * b - origin[0]) / cell))
+            j = int(np.floor((pose[1] + c * a + s * b - origin[1]) / cell))
+            if i < 0 or j < 0 or i >= len(grid) or j >= len(grid) or grid[i, j]:
+                return True
     return False
 
 

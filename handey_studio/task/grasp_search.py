@@ -10,7 +10,8 @@ from handey_studio.geometry.transforms import inverse
 from handey_studio.grasping import (
     HAND_MARGIN_M,
     BumpRun,
-    GraspEnd,
+    GraspGroup,
+    GraspPlane,
     LegalRotations,
     contact_area,
     fill_grasp_plane,
@@ -22,7 +23,7 @@ from handey_studio.grasping import (
 )
 from handey_studio.task.options import Option
 from handey_studio.task.plan import GraspChoice
-from handey_studio.world import FINGERS, World, arm_of
+from handey_studio.world import FINGERS, Hand, World, arm_of
 from handey_studio.world.collision import collision_model
 
 ANGLES_PER_GROUP = 2
@@ -61,12 +62,13 @@ def grasps_of(option: Option, entry: int, ledger: Ledger) -> list[Grasp]:
     if not rotations.legal.any():
         _fall_illegal(rotations, entry, ledger)
         return []
+    group, hand = option.group, option.goal.at_start.robot.hand
+    T_world_plane = option.T_world_start @ group.grasp_class.T_part_plane
+    opening = opening_around(hand, group.grasp_class.width)
+    plane = fill_grasp_plane(option.goal.at_start, T_world_plane, group.point, hand, opening)
     found = []
     for angle in rotations.best(ANGLES_PER_GROUP):
-        for side in (1, -1):
-            grasp = _approached(option, rotations, angle, side, entry, ledger)
-            if grasp is not None:
-                found.append(grasp)
+        found += _approached(option, rotations, approach_run(plane, group, hand, angle), angle, entry, ledger)
     if not found:
         ledger.fall(entry, "no way in was found at any legal angle")
     return found
@@ -88,32 +90,34 @@ def _fall_illegal(rotations: LegalRotations, entry: int, ledger: Ledger) -> None
                 limit=HAND_MARGIN_M, unit="m", bodies=rotations.blockers[k][end])  # fmt: skip
 
 
-def _approached(option: Option, rotations: LegalRotations, angle: float, side: int, parent: int, ledger: Ledger) -> Grasp | None:
-    """The grasp at one angle, if the bump-line planner finds a way in that ends with enough contact."""
+def _approached(option: Option, rotations: LegalRotations, run: BumpRun, angle: float, parent: int, ledger: Ledger) -> list[Grasp]:
+    """The grasps that a run of the bump-line planner leads to, one for each way round of the hand, if it ends with enough contact."""
     hand, group = option.goal.at_start.robot.hand, option.group
-    entry = ledger.add("approach", f"hand at {np.rad2deg(angle - group.angle):+.0f}°, side {side:+d}", parent=parent)
-    run = approach_run(option.pickup, option, angle)
+    entry = ledger.add("approach", f"hand at {np.rad2deg(angle - group.angle):+.0f}°", parent=parent)
     if run.status != "reached":
         reason = {"stuck": "the approach got stuck", "iterations": "the approach ran out of steps"}.get(
             run.status, "the way in starts blocked"
         )
-        ledger.fall(entry, reason, value=run.distance, limit=0.0, unit="m")
-        return None
+        ledger.fall(entry, reason, value=run.distance, limit=run.threshold, unit="m")
+        return []
     final = run.path[-1]
     area = contact_area(group.grasp_class, hand, final[:2], final[2])
     if area < hand.min_contact_area:
         ledger.fall(entry, "the fingers overlap the face too little after the approach", value=area,
                     limit=hand.min_contact_area, unit="m²")  # fmt: skip
-        return None
+        return []
     T_part_plane = group.grasp_class.T_part_plane
-    in_plane = np.array([hand_in_plane(pose[:2], pose[2], side) for pose in run.path])
-    back = _straight_back(final, side)
-    hands = option.T_world_start @ T_part_plane @ in_plane
-    retreat = option.goal.T_world_goal @ T_part_plane @ back
-    if _blocked(option, hands[-1], retreat[0], entry, ledger):
-        return None
-    choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), area)
-    return Grasp(option, choice, run, hands, retreat, entry)
+    found = []
+    for side in (1, -1):
+        in_plane = np.array([hand_in_plane(pose[:2], pose[2], side) for pose in run.path])
+        hands = option.T_world_start @ T_part_plane @ in_plane
+        retreat = option.goal.T_world_goal @ T_part_plane @ _straight_back(final, side)
+        if not found and _blocked(option, hands[-1], retreat[0], entry, ledger):
+            return []  # the hand looks the same either way round
+        choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), area)
+        turned = ledger.add("hand", "one way round" if side > 0 else "the other way round", parent=entry)
+        found.append(Grasp(option, choice, run, hands, retreat, turned))
+    return found
 
 
 def _blocked(option: Option, T_world_pickup: NDArray, T_world_putdown: NDArray, entry: int, ledger: Ledger) -> bool:
@@ -131,11 +135,8 @@ def _blocked(option: Option, T_world_pickup: NDArray, T_world_putdown: NDArray, 
     return False
 
 
-def approach_run(end: GraspEnd, option: Option, angle: float) -> BumpRun:
-    """The bump-line planner's run at one end, from as far out as the start is free."""
-    group, hand = option.group, end.world.robot.hand
-    T_world_plane = end.T_world_part @ group.grasp_class.T_part_plane
-    plane = fill_grasp_plane(end.world, T_world_plane, group.point, hand, opening_around(hand, group.grasp_class.width))
+def approach_run(plane: GraspPlane, group: GraspGroup, hand: Hand, angle: float) -> BumpRun:
+    """The bump-line planner's run with the hand at first at an angle, from as far out as the way in is free."""
     along = np.array([np.cos(angle), np.sin(angle)])
     runs = []
     for standoff in STANDOFFS_M:

@@ -8,17 +8,15 @@ from numpy.typing import NDArray
 from handey_studio.base import Ledger, Progress, Value, frozen_array
 from handey_studio.motion import Certificate, PathResult, certify, plan_path, straight_path, time_path
 from handey_studio.task.grasp_search import CLOSED_MARGIN_M, Grasp, finger_pairs, reachable
+from handey_studio.task.options import Pairs
 from handey_studio.task.plan import MovePlan, Step, StepKind
-from handey_studio.world import Held, PlacedPart, World
-from handey_studio.world.support import neighbours
-
-Pairs = tuple[tuple[str, str], ...]
+from handey_studio.world import Held, World
 
 LIFT_M = 0.06  # straight up from where it stood before the part is carried anywhere
 DESCENT_M = 0.06  # and straight down onto its destination
 STRAIGHT_STEP_M = 0.005
 FINGER_SPEED_M_S = 0.05
-MAX_PAIRS = 4  # IK branches at pickup × putdown that are tried for one grasp
+MAX_PAIRS = 6  # IK branches at pickup × putdown that are tried for one grasp
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,28 +49,38 @@ def complete(grasp: Grasp, start: Start, ledger: Ledger, progress: Progress, rng
     if not pickups or not putdowns:
         ledger.fall(grasp.entry, f"no arm configuration is free at the {'putdown' if pickups else 'pickup'}")
         return None
-    ends = [_pickup_end(grasp, q, ledger) for q in pickups[:MAX_PAIRS]]
-    others = [_putdown_end(grasp, q, ledger) for q in putdowns[:MAX_PAIRS]]
-    pairs = [(a, b) for a in ends if a is not None for b in others if b is not None]
-    pairs.sort(key=lambda pair: float(np.abs(pair[0].away.q_rad[-1] - pair[1].towards.q_rad[0]).max()))
-    for pickup, putdown in pairs[:MAX_PAIRS]:
-        if progress.cancelled:
-            return None
+    ends: dict[int, _End | None] = {}
+    others: dict[int, _End | None] = {}
+    joined = False
+    for a, b in _pairs(pickups, putdowns, start.q)[:MAX_PAIRS]:
+        if a not in ends:
+            ends[a] = _pickup_end(grasp, pickups[a], ledger)
+        if b not in others and ends[a] is not None:
+            others[b] = _putdown_end(grasp, putdowns[b], ledger)
+        pickup, putdown = ends[a], others.get(b)
+        if pickup is None or putdown is None or progress.cancelled:
+            continue
+        joined = True
         plan = _carry(grasp, pickup, putdown, start, ledger, progress, rng)
         if plan is not None:
             return plan
-    ledger.fall(grasp.entry, "no pair of arm configurations is joined by free paths" if pairs else "no straight way in and out is free")
+    ledger.fall(grasp.entry, "no pair of arm configurations is joined by free paths" if joined else "no straight way in and out is free")
     return None
+
+
+def _pairs(pickups: list[NDArray], putdowns: list[NDArray], q: NDArray) -> list[tuple[int, int]]:
+    """Which branch at the pickup with which at the putdown, least joint motion from the start over both first."""
+    cost = {
+        (a, b): float(np.abs(pickups[a] - q).max() + np.abs(putdowns[b] - pickups[a]).max())
+        for a in range(len(pickups))
+        for b in range(len(putdowns))
+    }
+    return sorted(cost, key=cost.__getitem__)
 
 
 def held_part(grasp: Grasp) -> Held:
     """The part in the hand after this grasp."""
     return Held(grasp.option.goal.instance.name, grasp.option.goal.instance.part, grasp.choice.T_hand_part)
-
-
-def support_pairs(world: World, placed: PlacedPart) -> Pairs:
-    """The bodies that a standing part may touch while it is lifted from there or put down there."""
-    return tuple((placed.name, neighbour.name) for neighbour in neighbours(world.without(placed.name), placed))
 
 
 def _pickup_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
@@ -82,7 +90,7 @@ def _pickup_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
     if into is None:
         return None
     lifted = _raised(grasp.T_world_hand_pickup, LIFT_M)
-    allowed = _supports_at_start(grasp)
+    allowed = goal.supports_at_start
     away = _straight(goal.carried, q, lifted, choice.width, held_part(grasp), allowed, "lift", grasp.entry, ledger)
     return None if away is None else _End(q, _reversed(into), away)
 
@@ -91,20 +99,11 @@ def _putdown_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
     """Placement and retreat with one IK branch."""
     goal, choice = grasp.option.goal, grasp.choice
     raised = _raised(grasp.T_world_hand_putdown, DESCENT_M)
-    down = _straight(goal.carried, q, raised, choice.width, held_part(grasp), _supports_at_goal(grasp), "place", grasp.entry, ledger)
+    down = _straight(goal.carried, q, raised, choice.width, held_part(grasp), goal.supports_at_goal, "place", grasp.entry, ledger)
     if down is None:
         return None
     away = _straight(goal.at_goal, q, grasp.retreat_hands, choice.opening, None, (), "retreat", grasp.entry, ledger)
     return None if away is None else _End(q, _reversed(down), away)
-
-
-def _supports_at_start(grasp: Grasp) -> Pairs:
-    return support_pairs(grasp.option.goal.at_start, grasp.option.goal.instance)
-
-
-def _supports_at_goal(grasp: Grasp) -> Pairs:
-    goal = grasp.option.goal
-    return support_pairs(goal.at_goal, goal.at_goal.part(goal.instance.name))
 
 
 def _carry(
@@ -152,7 +151,7 @@ def _steps(
     goal, choice, held = grasp.option.goal, grasp.choice, held_part(grasp)
     there, transfer, home = free
     grip = finger_pairs(held.name)
-    lift_pairs, place_pairs = _supports_at_start(grasp), _supports_at_goal(grasp)
+    lift_pairs, place_pairs = goal.supports_at_start, goal.supports_at_goal
     wide, tight = choice.opening, choice.width
     rows: list[tuple[StepKind, World, NDArray, tuple[float, float], Held | None, Pairs]] = [
         ("free", goal.at_start, start.q[None], (start.opening, wide), None, ()),

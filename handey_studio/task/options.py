@@ -14,14 +14,19 @@ from handey_studio.geometry.transforms import inverse
 from handey_studio.grasping import GraspEnd, GraspGroup, angle_range, grasp_groups
 from handey_studio.world import PlacedPart, World
 from handey_studio.world.collision import ALLOWED_DEPTH_M
-from handey_studio.world.support import MAX_GAP_M, neighbours
+from handey_studio.world.support import MAX_GAP_M, TOUCHING_M, neighbours
+
+Pairs = tuple[tuple[str, str], ...]
 
 OFF_CENTRE_COST = 4.0  # [rad/m]: a grasp 10 cm off the centre of mass ranks like one tilted by 0.4 rad more
 
 
 @dataclass(frozen=True, eq=False)
 class Goal(Value):
-    """One instance to move and one place for it: `worlds` with the part at the start, in the hand, and at the goal."""
+    """One instance to move and one place for it: the worlds with the part at the start, in the hand, and at the goal.
+
+    `supports_at_start` and `supports_at_goal` are the pairs that may touch while it is lifted, and while it is put down.
+    """
 
     instance: PlacedPart
     label: str
@@ -30,6 +35,8 @@ class Goal(Value):
     at_start: World
     carried: World
     at_goal: World
+    supports_at_start: Pairs
+    supports_at_goal: Pairs
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_goal", frozen_array(self.T_world_goal))
@@ -83,7 +90,9 @@ def check_goal(world: World, instance: PlacedPart, label: str, T_world_goal: NDA
         height = placed.corners_world[:, 2].min() - world.table_z
         ledger.fall(entry, "nothing holds the part up at the destination", value=height, limit=MAX_GAP_M, unit="m")
         return None
-    return Goal(instance, label, T_world_goal, entry, world, carried, carried.with_part(placed))
+    at_start = tuple((instance.name, neighbour.name) for neighbour in neighbours(carried, instance))
+    at_goal = tuple((instance.name, neighbour.name) for neighbour in near if neighbour.gap <= TOUCHING_M)
+    return Goal(instance, label, T_world_goal, entry, world, carried, carried.with_part(placed), at_start, at_goal)
 
 
 def list_options(goals: list[Goal], ledger: Ledger) -> list[Option]:

@@ -16,32 +16,35 @@ class Tree(NamedTuple):
     right: NDArray
 
 
-@njit(cache=True)
 def build_tree(low: NDArray, high: NDArray) -> Tree:
-    """The tree of k ≥ 1 boxes (k, 3) [m], halved at the median along the longest side of their centres."""
+    """The tree of k ≥ 1 boxes (k, 3) [m]: complete, over the boxes in Morton order of their centres, so that neighbours share nodes.
+
+    Leaves that fill it up to a power of two are nowhere: infinitely far from everything.
+    """
     k = len(low)
-    nodes = max(2 * k - 1, 1)
-    node_low, node_high = np.empty((nodes, 3)), np.empty((nodes, 3))
-    left, right = np.full(nodes, -1, np.int64), np.full(nodes, -1, np.int64)
-    order, centres = np.arange(k), (low + high) / 2.0
-    todo, used = [(0, 0, k)], 1
-    while len(todo) > 0:
-        node, start, end = todo.pop()
-        mine = order[start:end].copy()
+    leaves = 1 << int(np.ceil(np.log2(k)))
+    lows, highs = [np.full((leaves, 3), np.inf)], [np.full((leaves, 3), np.inf)]
+    order = np.argsort(_morton((low + high) / 2.0), kind="stable")
+    lows[0][:k], highs[0][:k] = low[order], high[order]
+    while len(lows[0]) > 1:
+        below = highs[0].reshape(-1, 2, 3)
+        lows.insert(0, lows[0].reshape(-1, 2, 3).min(axis=1))
+        highs.insert(0, np.where(np.isinf(below[:, 1]), below[:, 0], below.max(axis=1)))
+    inner = np.arange(leaves - 1)
+    left = np.concatenate([2 * inner + 1, np.full(leaves, -1)])
+    right = np.concatenate([2 * inner + 2, order, np.full(leaves - k, -1)])
+    return Tree(np.concatenate(lows), np.concatenate(highs), left, right)
+
+
+def _morton(centres: NDArray) -> NDArray:
+    """Numbers (k,) whose order keeps neighbours together: the bits of the three coordinates, on a grid of 1024, taken in turn."""
+    low = centres.min(axis=0)
+    grid = ((centres - low) / max(float(np.ptp(centres, axis=0).max()), 1e-12) * 1023).astype(np.int64)
+    code = np.zeros(len(centres), np.int64)
+    for bit in range(10):
         for axis in range(3):
-            node_low[node, axis] = low[mine, axis].min()
-            node_high[node, axis] = high[mine, axis].max()
-        if end - start == 1:
-            right[node] = mine[0]
-            continue
-        spread = np.array([centres[mine, axis].max() - centres[mine, axis].min() for axis in range(3)])
-        order[start:end] = mine[np.argsort(centres[mine, np.argmax(spread)])]
-        middle = (start + end) // 2
-        left[node], right[node] = used, used + 1
-        todo.append((used, start, middle))
-        todo.append((used + 1, middle, end))
-        used += 2
-    return Tree(node_low, node_high, left, right)
+            code |= ((grid[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return code
 
 
 @njit(cache=True)

@@ -191,6 +191,10 @@ class CollisionModel:
         """How deep [m] two bodies overlap. A column is as narrow as the map's cell: many of them tell how deep a wide body stands."""
         if hit.kind == 1:
             column = self.terrain.corners[self.terrain.first[hit.other] : self.terrain.first[hit.other + 1]]
+            first = bodies.shapes.first
+            lift = float(column[:, 2].max() - placing.corners[first[hit.body] : first[hit.body + 1], 2].min())
+            if lift <= ALLOWED_DEPTH_M:  # raised by that much the body is clear: no need to ask for the least shift
+                return max(lift, 0.0)
             return penetration(bodies.fcl_object(hit.body, placing), fcl_box(column))
         mine = bodies.fcl_object(hit.body, placing)
         if hit.kind == 2:

@@ -39,12 +39,18 @@ class Hit(NamedTuple):
 
 
 @njit(cache=True)
+def _product(S: NDArray, T: NDArray, out: NDArray) -> None:
+    for i in range(4):
+        for j in range(4):
+            out[i, j] = S[i, 0] * T[0, j] + S[i, 1] * T[1, j] + S[i, 2] * T[2, j] + S[i, 3] * T[3, j]
+
+
+@njit(cache=True)
 def forward(chain: Chain, q: NDArray) -> NDArray:
     """Ts_world_link (n + 1, 4, 4) of the base and each moving link at q (n,) [rad]."""
     n = len(q)
-    poses = np.zeros((n + 1, 4, 4))
+    poses, hinge, turn = np.zeros((n + 1, 4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
     poses[0] = chain.T_base
-    turn = np.zeros((4, 4))
     turn[3, 3] = 1.0
     for i in range(n):
         x, y, z = chain.axes[i]
@@ -53,7 +59,8 @@ def forward(chain: Chain, q: NDArray) -> NDArray:
         turn[0, 0], turn[0, 1], turn[0, 2] = c + x * x * v, x * y * v - z * s, x * z * v + y * s
         turn[1, 0], turn[1, 1], turn[1, 2] = y * x * v + z * s, c + y * y * v, y * z * v - x * s
         turn[2, 0], turn[2, 1], turn[2, 2] = z * x * v - y * s, z * y * v + x * s, c + z * z * v
-        poses[i + 1] = poses[i] @ chain.T_links[i] @ turn
+        _product(poses[i], chain.T_links[i], hinge)
+        _product(hinge, turn, poses[i + 1])
     return poses
 
 
@@ -62,9 +69,10 @@ def placed(shapes: Shapes, poses: NDArray, opening: float) -> NDArray:
     """Corners (v, 3) [m] of all bodies in the world."""
     out = np.empty_like(shapes.corners)
     for b in range(len(shapes.link)):
-        T, shift = poses[shapes.link[b]], shapes.slide[b] * opening
+        T = poses[shapes.link[b]]
+        u, v, w = shapes.slide[b, 0] * opening, shapes.slide[b, 1] * opening, shapes.slide[b, 2] * opening
         for i in range(shapes.first[b], shapes.first[b + 1]):
-            x, y, z = shapes.corners[i, 0] + shift[0], shapes.corners[i, 1] + shift[1], shapes.corners[i, 2] + shift[2]
+            x, y, z = shapes.corners[i, 0] + u, shapes.corners[i, 1] + v, shapes.corners[i, 2] + w
             for axis in range(3):
                 out[i, axis] = T[axis, 0] * x + T[axis, 1] * y + T[axis, 2] * z + T[axis, 3]
     return out
@@ -76,8 +84,10 @@ def bounds(shapes: Shapes, corners: NDArray) -> NDArray:
     out = np.empty((len(shapes.link), 2, 3))
     for b in range(len(out)):
         for axis in range(3):
-            mine = corners[shapes.first[b] : shapes.first[b + 1], axis]
-            out[b, 0, axis], out[b, 1, axis] = mine.min(), mine.max()
+            low, high = np.inf, -np.inf
+            for i in range(shapes.first[b], shapes.first[b + 1]):
+                low, high = min(low, corners[i, axis]), max(high, corners[i, axis])
+            out[b, 0, axis], out[b, 1, axis] = low, high
     return out
 
 

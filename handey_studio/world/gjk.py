@@ -29,75 +29,90 @@ def _dot(a: NDArray, b: NDArray) -> float:
 
 
 @njit(cache=True)
+def _normal(W: NDArray, i: int, j: int, k: int) -> tuple[float, float, float]:
+    """The normal of triangle ijk, twice its area long."""
+    ax, ay, az = W[j, 0] - W[i, 0], W[j, 1] - W[i, 1], W[j, 2] - W[i, 2]
+    bx, by, bz = W[k, 0] - W[i, 0], W[k, 1] - W[i, 1], W[k, 2] - W[i, 2]
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@njit(cache=True)
 def _on_segment(W: NDArray, i: int, j: int, v: NDArray) -> int:
     """Writes the point of segment ij nearest the origin into v; which corners carry it, as bits."""
-    along = W[j] - W[i]
-    length, t = _dot(along, along), -_dot(W[i], along)
+    x, y, z = W[j, 0] - W[i, 0], W[j, 1] - W[i, 1], W[j, 2] - W[i, 2]
+    length, t = x * x + y * y + z * z, -(W[i, 0] * x + W[i, 1] * y + W[i, 2] * z)
+    mask = (1 << i) | (1 << j)
     if t <= 0.0 or length == 0.0:
-        v[:] = W[i]
-        return 1 << i
-    if t >= length:
-        v[:] = W[j]
-        return 1 << j
-    v[:] = W[i] + along * (t / length)
-    return (1 << i) | (1 << j)
+        t, mask = 0.0, 1 << i
+    elif t >= length:
+        t, mask = 1.0, 1 << j
+    else:
+        t /= length
+    v[0], v[1], v[2] = W[i, 0] + t * x, W[i, 1] + t * y, W[i, 2] + t * z
+    return mask
 
 
 @njit(cache=True)
-def _on_triangle(W: NDArray, i: int, j: int, k: int, v: NDArray) -> int:
+def _beyond(W: NDArray, i: int, j: int, nx: float, ny: float, nz: float) -> bool:
+    """Whether the origin lies outside the wall on side ij of a triangle with normal n."""
+    x, y, z = W[j, 0] - W[i, 0], W[j, 1] - W[i, 1], W[j, 2] - W[i, 2]
+    return (ny * z - nz * y) * W[i, 0] + (nz * x - nx * z) * W[i, 1] + (nx * y - ny * x) * W[i, 2] > 0.0
+
+
+@njit(cache=True)
+def _keep_nearer(mask: int, v: NDArray, side: int, other: NDArray) -> int:
+    """The nearer of two points to the origin, in v, and the corners that carry it."""
+    if _dot(other, other) < _dot(v, v):
+        v[0], v[1], v[2] = other[0], other[1], other[2]
+        return side
+    return mask
+
+
+@njit(cache=True)
+def _on_triangle(W: NDArray, i: int, j: int, k: int, v: NDArray, spare: NDArray) -> int:
     """The same for triangle ijk: inside its three walls its plane's foot, else the best of its sides."""
-    ab, ac = W[j] - W[i], W[k] - W[i]
-    n = np.cross(ab, ac)
-    nn = _dot(n, n)
-    if nn > 1e-30 * _dot(ab, ab) * _dot(ac, ac):
-        inside_ab = _dot(np.cross(n, ab), W[i]) <= 0.0
-        inside_bc = _dot(np.cross(n, W[k] - W[j]), W[j]) <= 0.0
-        inside_ca = _dot(np.cross(n, -ac), W[k]) <= 0.0
-        if inside_ab and inside_bc and inside_ca:
-            v[:] = n * (_dot(W[i], n) / nn)
-            return (1 << i) | (1 << j) | (1 << k)
+    nx, ny, nz = _normal(W, i, j, k)
+    nn = nx * nx + ny * ny + nz * nz
+    if nn > 0.0 and not (_beyond(W, i, j, nx, ny, nz) or _beyond(W, j, k, nx, ny, nz) or _beyond(W, k, i, nx, ny, nz)):
+        share = (W[i, 0] * nx + W[i, 1] * ny + W[i, 2] * nz) / nn
+        v[0], v[1], v[2] = nx * share, ny * share, nz * share
+        return (1 << i) | (1 << j) | (1 << k)
     mask = _on_segment(W, i, j, v)
-    other = np.empty(3)
-    for a, b in ((j, k), (k, i)):
-        side = _on_segment(W, a, b, other)
-        if _dot(other, other) < _dot(v, v):
-            mask = side
-            v[:] = other
-    return mask
+    mask = _keep_nearer(mask, v, _on_segment(W, j, k, spare), spare)
+    return _keep_nearer(mask, v, _on_segment(W, k, i, spare), spare)
 
 
 @njit(cache=True)
-def _on_tetrahedron(W: NDArray, v: NDArray) -> int:
+def _on_tetrahedron(W: NDArray, v: NDArray, spare: NDArray, other: NDArray) -> int:
     """The same for all four corners; 15 when the origin is inside."""
-    mask, least = 15, 1e300
-    other = np.empty(3)
-    for i, j, k, apex in ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 3, 1), (1, 2, 3, 0)):
-        n = np.cross(W[j] - W[i], W[k] - W[i])
-        if -_dot(n, W[i]) * _dot(n, W[apex] - W[i]) > 0.0:
-            continue
-        side = _on_triangle(W, i, j, k, other)
-        if _dot(other, other) < least:
-            mask, least = side, _dot(other, other)
-            v[:] = other
+    mask = 15
+    v[0] = 1e150
+    for apex in range(4):
+        i, j, k = (1 if apex == 0 else 0), (2 if apex < 2 else 1), (3 if apex < 3 else 2)
+        nx, ny, nz = _normal(W, i, j, k)
+        origin = -(nx * W[i, 0] + ny * W[i, 1] + nz * W[i, 2])
+        across = nx * (W[apex, 0] - W[i, 0]) + ny * (W[apex, 1] - W[i, 1]) + nz * (W[apex, 2] - W[i, 2])
+        if origin * across <= 0.0:
+            mask = _keep_nearer(mask, v, _on_triangle(W, i, j, k, other, spare), other)
     return mask
 
 
 @njit(cache=True)
-def _nearest(W: NDArray, n: int, v: NDArray) -> int:
+def _nearest(W: NDArray, n: int, v: NDArray, spare: NDArray, other: NDArray) -> int:
     """Nearest point of the simplex of n corners to the origin, into v; the corners that carry it move to the front, their count returns."""
+    mask = 1
     if n == 1:
-        v[:] = W[0]
-        return 1
-    if n == 2:
+        v[0], v[1], v[2] = W[0, 0], W[0, 1], W[0, 2]
+    elif n == 2:
         mask = _on_segment(W, 0, 1, v)
     elif n == 3:
-        mask = _on_triangle(W, 0, 1, 2, v)
+        mask = _on_triangle(W, 0, 1, 2, v, spare)
     else:
-        mask = _on_tetrahedron(W, v)
+        mask = _on_tetrahedron(W, v, spare, other)
     kept = 0
     for i in range(n):
         if mask & (1 << i):
-            W[kept] = W[i]
+            W[kept, 0], W[kept, 1], W[kept, 2] = W[i, 0], W[i, 1], W[i, 2]
             kept += 1
     return kept
 
@@ -108,21 +123,24 @@ def distance(A: NDArray, a0: int, a1: int, B: NDArray, b0: int, b1: int, limit: 
 
     Ends early with some value ≥ `limit` as soon as that much is certain.
     """
-    W, v, bound, n = np.empty((4, 3)), A[a0] - B[b0], 0.0, 0
+    W, v, spare, other = np.empty((4, 3)), np.empty(3), np.empty(3), np.empty(3)
+    v[0], v[1], v[2] = A[a0, 0] - B[b0, 0], A[a0, 1] - B[b0, 1], A[a0, 2] - B[b0, 2]
+    bound, n = 0.0, 0
     for _ in range(MAX_ITERATIONS):
         vv = _dot(v, v)
         if vv < TOUCHING_SQUARED:
             return 0.0
-        w = A[_farthest(A, a0, a1, -v[0], -v[1], -v[2])] - B[_farthest(B, b0, b1, v[0], v[1], v[2])]
-        vw = _dot(v, w)
+        a, b = _farthest(A, a0, a1, -v[0], -v[1], -v[2]), _farthest(B, b0, b1, v[0], v[1], v[2])
+        x, y, z = A[a, 0] - B[b, 0], A[a, 1] - B[b, 1], A[a, 2] - B[b, 2]
+        vw = v[0] * x + v[1] * y + v[2] * z
         bound = max(bound, vw / np.sqrt(vv))
         if bound >= limit or vv - vw <= CONVERGED * vv:
             return bound
         for i in range(n):
-            if W[i, 0] == w[0] and W[i, 1] == w[1] and W[i, 2] == w[2]:
+            if W[i, 0] == x and W[i, 1] == y and W[i, 2] == z:
                 return bound
-        W[n] = w
-        n = _nearest(W, n + 1, v)
+        W[n, 0], W[n, 1], W[n, 2] = x, y, z
+        n = _nearest(W, n + 1, v, spare, other)
         if n == 4:
             return 0.0
     return bound

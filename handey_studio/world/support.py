@@ -28,25 +28,36 @@ class Neighbour:
 
 def neighbours(world: World, placed: PlacedPart, within: float = TOUCHING_M) -> tuple[Neighbour, ...]:
     """Every body of the world, other than the part itself, that is nearer to it than `within` [m], nearest first."""
-    pieces = [apply(placed.T_world_part, piece) for piece in placed.part.pieces]
-    solids = [(name, corners) for name, corners in solids_of(world.without(placed.name)) if name != OUTSIDE]
-    solids += [(DEPTH_MAP, corners) for corners in columns_of(world.terrain, world.table_z, float(world.free_space[1, 2]))]
-    low = np.min([piece.min(axis=0) for piece in pieces], axis=0) - within
-    high = np.max([piece.max(axis=0) for piece in pieces], axis=0) + within
     found: dict[str, Neighbour] = {}
-    for name, corners in solids:
-        if (corners.max(axis=0) < low).any() or (corners.min(axis=0) > high).any():
-            continue
-        gap = min(_gap(name, piece, corners) for piece in pieces)
-        if gap <= within and (name not in found or gap < found[name].gap):
-            below = bool(corners[:, 2].min() < low[2] + 2 * within)
-            found[name] = Neighbour(name, gap, below or found.get(name, Neighbour(name, 0, False)).below)
+    lowest = float(placed.corners_world[:, 2].min())
+    for part_piece in placed.part.pieces:
+        piece = np.ascontiguousarray(apply(placed.T_world_part, part_piece))
+        mine = fcl.CollisionObject(fcl_convex(piece))
+        for name, corners in _near(world.without(placed.name), piece, within):
+            gap = _gap(name, piece, mine, corners)
+            if gap <= within:
+                before = found.get(name, Neighbour(name, np.inf, False))
+                below = before.below or bool(corners[:, 2].min() < lowest + 2 * within)
+                found[name] = Neighbour(name, min(gap, before.gap), below)
     return tuple(sorted(found.values(), key=lambda neighbour: neighbour.gap))
 
 
-def _gap(name: str, piece: NDArray, corners: NDArray) -> float:
-    apart = distance(np.ascontiguousarray(piece), 0, len(piece), np.ascontiguousarray(corners), 0, len(corners), 1e-9)
+def _near(world: World, piece: NDArray, within: float) -> list[tuple[str, NDArray]]:
+    """Names and corners of the solids and columns whose bounding boxes come near a piece's."""
+    low, high = piece.min(axis=0) - within, piece.max(axis=0) + within
+    solids = [(name, corners) for name, corners in solids_of(world) if name != OUTSIDE]
+    columns = columns_of(world.terrain, world.table_z, float(world.free_space[1, 2]))
+    near = [(name, corners) for name, corners in solids if not _apart(corners[None], low, high)[0]]
+    return near + [(DEPTH_MAP, corners) for corners in columns[~_apart(columns, low, high)]]
+
+
+def _apart(stack: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """Which bodies (k,) of corners (k, n, 3) have no bounding box in common with low…high."""
+    return (stack.max(axis=1) < low).any(axis=1) | (stack.min(axis=1) > high).any(axis=1)
+
+
+def _gap(name: str, piece: NDArray, mine: fcl.CollisionObject, corners: NDArray) -> float:
+    apart = distance(piece, 0, len(piece), np.ascontiguousarray(corners), 0, len(corners), 1e-9)
     if apart > 0:
         return float(apart)
-    other = fcl_box(corners) if name == DEPTH_MAP else fcl.CollisionObject(fcl_convex(corners))
-    return -penetration(fcl.CollisionObject(fcl_convex(piece)), other)
+    return -penetration(mine, fcl_box(corners) if name == DEPTH_MAP else fcl.CollisionObject(fcl_convex(corners)))

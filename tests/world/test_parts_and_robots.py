@@ -99,7 +99,7 @@ def test_rubbish_is_refused_in_one_sentence(tmp_path):
     ("old", "new", "says"),
     [
         ('ik = "ur"', "", "lacks the key 'ik'"),
-        ("home_deg = [0, -110", "home_deg = [999, -110", "home_deg lies outside"),
+        ("home_deg = [-90, -110", "home_deg = [999, -110", "home_deg lies outside"),
         ("velocity_deg_s = [90, 90, 90, 120, 120, 120]", "velocity_deg_s = [90]", "must list 6 finite numbers"),
         ("name =", "name = =", "cannot be read as TOML"),
     ],
