@@ -1,0 +1,116 @@
+"""Pictures and lists as text: what they show, and that nothing a user wrote becomes markup."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handey_studio.app import html
+from handey_studio.app.palette import elevation_colours
+from handey_studio.app.panels.findings import grasp_facts, result_html
+from handey_studio.app.panels.ledger import ledger_html
+from handey_studio.app.panels.sensing import edge_labels, found_html, hypothesis_labels, number_of, picked
+from handey_studio.app.panels.timeline import strip
+from handey_studio.app.scene.depth import elevation_span, stride_of, thinned
+from handey_studio.app.svg import SIZE, grasp_plane_svg
+from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.session import Replay
+from handey_studio.session.looking import unexplained
+from tests.session.samples import T_START, full_session, hand_made_scan, library
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    return full_session(tmp_path_factory.mktemp("library"))
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory):
+    return library(tmp_path_factory.mktemp("library")).robot("ur5")
+
+
+def test_the_grasp_plane_shows_world_up_up_and_the_hand_where_it_ends(session, robot):
+    run = session.results[0].plan.approach
+    svg = grasp_plane_svg(run, robot.hand)
+    points = [tuple(map(float, p.split(","))) for p in re.search(r'<polyline points="([^"]+)"', svg)[1].split()]
+    assert len(points) == len(run.path) and points[0][1] < points[-1][1], "the hand comes down"
+    goal = re.search(r'<circle cx="([\d.-]+)" cy="([\d.-]+)"', svg)
+    assert np.hypot(float(goal[1]) - points[-1][0], float(goal[2]) - points[-1][1]) < 1.0
+    assert all(-6 <= float(n) <= SIZE + 6 for n in re.findall(r"[ML]([\d.-]+) ", re.search(r'<path d="([^"]+)"', svg)[1]))
+
+
+def test_words_of_others_are_escaped_everywhere(session):
+    evil = "<script>alert(1)</script>"
+    entries = tuple(replace(entry, stage=evil, option=evil, reason=evil, bodies=(evil,)) for entry in session.results[0].ledger)
+    result = replace(session.results[0], reason=evil, status="failed", plan=None, timing_s={evil: 1.0})
+    scene = replace(session.scene, instances=tuple(replace(placed, name=evil) for placed in session.located))
+    located = replace(scene.located, reason=evil)
+    shown = [ledger_html(entries, 9), result_html(result), found_html(replace(session, scene=replace(scene, located=located)))]
+    shown += [html.card(evil, evil, testid=evil), html.facts([(evil, evil)]), html.empty(evil), html.swatch((0, 0, 0), evil)]
+    assert all("<script" not in text for text in shown)
+
+
+def test_the_timeline_strip_names_the_step_at_its_time(session, robot):
+    replay = Replay(robot, session.results[0].plan)
+    assert "step 3 of 5: transfer, holding l_block#1" in strip(replay, 5.0, False, 1.0)
+    assert "left:50.000%" in strip(replay, 5.0, True, 1.0)
+
+
+def test_numbers_are_read_in_millimetres_and_degrees():
+    assert html.number(0.00125, "m") == "1.25 mm"
+    assert html.number(np.pi / 2, "rad") == "90 °"
+    assert html.number(3.0, "deg") == "3 deg"
+    assert html.number(2.5, "") == "2.5"
+
+
+def test_labels_lead_back_to_their_numbers(session):
+    for labels in (hypothesis_labels(session), edge_labels(session)):
+        assert [number_of(label) for label in labels] == list(range(-1, len(labels) - 1))
+        assert picked(labels, 99) == picked(labels, -1) == "none"
+        assert number_of(picked(labels, 1)) == 1
+
+
+def test_grasp_facts_speak_of_classes_and_angles(session):
+    facts = dict(grasp_facts(session.results[0].plan))
+    assert facts["Legal angles"] == "69° to 109°" and facts["Fingers"] == "40.0 mm held, 60 mm open"
+
+
+def test_elevation_colours_grow_lighter_above_the_table():
+    colours = elevation_colours(np.linspace(0.12, 1.0, 50)).astype(float)
+    lightness = colours @ (0.2126, 0.7152, 0.0722)
+    assert (np.diff(lightness) > -0.5).all() and lightness[-1] > lightness[0] + 60
+
+
+def test_a_large_scan_is_thinned_and_stays_in_place():
+    elevation = np.full((700, 900), 0.01)
+    elevation[100:200, 100:200] = np.nan
+    scan = DepthMap(elevation, 0.001, T_START, np.zeros((1, 3)), np.zeros(elevation.shape))
+    stride = stride_of(scan)
+    points, heights = thinned(scan, np.ones(elevation.shape, dtype=bool), stride)
+    assert 30_000 < len(points) <= 50_000 and (heights == 0.01).all()
+    everything = scan.points_world()
+    step = np.linalg.norm(everything[:, None] - points[:20][None], axis=2).min(axis=0)
+    assert step.max() < 1e-12
+
+
+def test_an_empty_table_is_not_blown_up():
+    scan = hand_made_scan()
+    assert elevation_span(replace(scan, elevation=np.full((5, 5), 0.0003), source=np.zeros((5, 5)))) == 0.02
+    assert elevation_span(replace(scan, elevation=np.full((5, 5), np.nan), source=np.zeros((5, 5)))) == 0.02
+
+
+def test_readings_on_a_located_part_leave_the_map_with_it(session):
+    scan, part = session.scan, session.located[0]
+    top = part.part.solid.vertices[:, 2].max()
+    elevation = np.array(scan.elevation)
+    j, i = np.mgrid[: elevation.shape[0], : elevation.shape[1]]
+    world = np.c_[(i.ravel() + 0.5) * scan.cell, (j.ravel() + 0.5) * scan.cell] + scan.T_world_range[:2, 3]
+    local = (world - T_START[:2, 3]) @ T_START[:2, :2]
+    inside = ((local > 0.004) & (local < (0.055, 0.025))).all(axis=1).reshape(elevation.shape)
+    elevation[inside] = top
+    scene = replace(session.scene, depth_map=replace(scan, elevation=elevation), instances=(part,))
+    left = unexplained(scene)
+    assert not left[inside].any() and inside.sum() > 20
+    far = np.hypot(*(world - T_START[:2, 3]).T).reshape(elevation.shape) > 0.12
+    assert left[far & np.isfinite(elevation)].all()
