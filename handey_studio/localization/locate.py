@@ -14,6 +14,7 @@ from handey_studio.localization.distinct import displacement, distinct
 from handey_studio.localization.edges import edge_pixels
 from handey_studio.localization.evidence import Evidence, evidence_of, limits_of
 from handey_studio.localization.hypotheses import FELL, hypothesize, tolerances
+from handey_studio.localization.overlap import overlap_depth
 from handey_studio.localization.pairs import data_lines, data_pairs, model_edges, model_pairs
 from handey_studio.localization.refine import refine, weights_of
 from handey_studio.localization.render import rendered_depth
@@ -42,6 +43,7 @@ class _Search:
     options: LocateOptions
     pixel: float
     table: bool
+    models: dict[str, Part]
     ledger: Ledger
     fell: Counter[str]
     timing: dict[str, float]
@@ -72,7 +74,7 @@ def localize(
     so that all stages are called alike.
     """
     options, progress = options or LocateOptions(), progress or Silent()
-    search = _look(view, options)
+    search = _look(view, parts, options)
     candidates: list[_Candidate] = []
     for number, part in enumerate(parts):
         progress.report(number / max(len(parts), 1), f"matching {len(search.edges)} edges with {part.name}")
@@ -94,7 +96,7 @@ def localize(
     )
 
 
-def _look(view: DepthView, options: LocateOptions) -> _Search:
+def _look(view: DepthView, parts: Sequence[Part], options: LocateOptions) -> _Search:
     """Edges and evidence of a view."""
     timing: dict[str, float] = dict.fromkeys(STAGES, 0.0)
     start = time.perf_counter()
@@ -109,7 +111,8 @@ def _look(view: DepthView, options: LocateOptions) -> _Search:
     timing["evidence"] = time.perf_counter() - start
     ledger = Ledger()
     ledger.add("edges", f"{len(edges)} straight edges in the depth map", None if edges else "no straight edge found")
-    return _Search(view, evidence, edges, options, surface.pixel, _sees_table(view, options), ledger, Counter(), timing)
+    models = {part.name: part for part in parts}
+    return _Search(view, evidence, edges, options, surface.pixel, _sees_table(view, options), models, ledger, Counter(), timing)
 
 
 def _sees_table(view: DepthView, options: LocateOptions) -> bool:
@@ -210,6 +213,7 @@ def _objection(
 ) -> tuple[str, float, float, str] | None:
     """The first thing that speaks against a candidate: reason, value, limit, unit."""
     options, part = search.options, candidate.part
+    models = search.models
     instances = [pose for pose in accepted if pose.part == part.name]
     T = pose_matrix(candidate.R, candidate.t)
     if len(instances) >= options.max_poses:
@@ -220,6 +224,10 @@ def _objection(
     claimed = float(verdict.taken[0] / max(verdict.on[0], 1e-12))
     if claimed > 0.3:
         return "its surface is explained by a better pose", claimed, 0.3, ""
+    tolerance = 6.0 * search.view.noise + search.view.outline_error
+    through = max((overlap_depth(part, T, models[pose.part], pose.T_sensor_part) for pose in accepted), default=0.0)
+    if through > tolerance:
+        return "it would pass through a better pose", through, tolerance, "m"
     depth = _below_table(search, candidate)
     allowed = 6.0 * search.view.noise + 0.5 * search.view.outline_error
     if depth > allowed:

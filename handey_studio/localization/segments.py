@@ -14,6 +14,7 @@ from handey_studio.sensing.depth_view import DepthView
 
 MIN_PIXELS = 10
 MAX_TURN = np.deg2rad(30.0)  # a pixel's own direction against the segment's: pixel directions are rough
+SETTLED = 12  # pixels after which the line alone decides: at corners the pixels' own directions mix
 MAX_BENDS = 4  # rounds of cutting a segment in two
 TRIM = 2.5  # sigmas; two rounds of trimming take the corners' rounding off a segment
 
@@ -224,7 +225,7 @@ def _grow(
                         continue
                     turn = abs(theta[j] - angle) % np.pi
                     off = abs(-(x - cx) * np.sin(angle) + (y - cy) * np.cos(angle))
-                    if min(turn, np.pi - turn) > max_turn or off > across + 0.5:
+                    if off > across + 0.5 or (n < SETTLED and min(turn, np.pi - turn) > max_turn):
                         continue
                     if abs(depth[y, x] - depth[v[i], u[i]]) > gate * (1 + max(abs(du), abs(dv))):
                         continue

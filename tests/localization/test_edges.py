@@ -21,7 +21,8 @@ def test_a_box_from_above_shows_its_top_outline():
     T = from_xyz_rpy((0.48, 0.01, 0.015), (0, 0, 0.4))
     edges = edges_of(map_from_above([(box([0.08, 0.05, 0.03]), T)], np.random.default_rng(0)).view(), 0.02)
     assert len(edges) == 4 and {edge.kind for edge in edges} == {"jump"}
-    assert np.allclose(sorted(edge.length for edge in edges), [0.05, 0.05, 0.08, 0.08], atol=0.003)
+    short = np.array([0.05, 0.05, 0.08, 0.08]) - sorted(edge.length for edge in edges)
+    assert (short > -0.0005).all() and (short < 0.006).all(), "an edge loses its corners, and never gains"
     for edge in edges:
         assert np.allclose(edge.ends_world[:, 2], 0.03, atol=0.0006)
         in_part = (edge.ends_world.mean(axis=0) - T[:3, 3]) @ T[:3, :3]
