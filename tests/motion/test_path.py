@@ -16,8 +16,10 @@ BIG = Held("plank#1", Part("plank", box([0.03, 0.20, 0.03])), np.eye(4))
 
 
 def at(T: np.ndarray, near: np.ndarray = ROBOT.home) -> np.ndarray:
-    """The configuration nearest to another that puts the hand at a pose."""
+    """The configuration nearest to another that puts the hand at a pose, without the arm meeting the bare table where that can be."""
     branches = arm_of(ROBOT).nearest_turns(arm_of(ROBOT).ik(T), near)
+    bare = collision_model(World(ROBOT))
+    branches = np.array([q for q in branches if bare.in_contact(q, 0.0) is None] or branches)
     return branches[int(np.argmin(np.abs(branches - near).max(axis=1)))]
 
 
