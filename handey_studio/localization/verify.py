@@ -134,9 +134,8 @@ def edge_state(R, t, k, samples, evidence, limits):
             return 1, edge
     beyond = limits.outside + evidence.pixel
     seen = reading_at(x - beyond * ix, y - beyond * iy, z - beyond * iz, evidence, limits)[0]
-    if seen == HIDDEN:  # a wall rises there: the part's own at a concave edge; a neighbour's shows no edge of the part's
-        return (2 if samples.concave[k] else -1), -1
-    return (2 if seen in (THROUGH, UNKNOWN) else 0), -1
+    ends = seen in (THROUGH, UNKNOWN) or (seen == HIDDEN and samples.concave[k])  # at a concave edge the part's own wall rises
+    return (2 if ends else 0), -1
 
 
 @njit(cache=True)
