@@ -43,6 +43,7 @@ from handey_studio.world.robot import Robot
 from handey_studio.world.world import World
 
 ALLOWED_DEPTH_M = 0.002  # bodies that may touch may be believed this deep in each other: 1 mm contact, 1 mm of the pose's own error
+MOST_BODIES = 64  # grasps whose bodies are kept at hand
 FAR_M = 1e3  # farther than anything: no limit to a search for the nearest pair
 HELD = 1  # number of whatever the hand holds; the depth map's is 0
 
@@ -145,6 +146,8 @@ class CollisionModel:
         """The moving bodies with one thing held."""
         key = (held, hand_only)
         if key not in self._bodies:
+            if len(self._bodies) >= MOST_BODIES:
+                self._bodies.clear()
             pieces = self._pieces + (held_pieces(self.world.robot, held) if held else [])
             if hand_only:
                 wrist = {body.name for body in self.arm.bodies}
