@@ -6,6 +6,7 @@ from handey_studio.motion.query import PathOptions
 from handey_studio.motion.results import Certificate, CSpaceSummary, Leg, PathResult, Trajectory
 from handey_studio.motion.straight import straight_path
 from handey_studio.motion.timing import time_path
+from handey_studio.motion.warm_up import warm_up
 
 __all__ = [
     "MARGIN_M",
@@ -19,4 +20,5 @@ __all__ = [
     "plan_path",
     "straight_path",
     "time_path",
+    "warm_up",
 ]

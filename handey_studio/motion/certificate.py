@@ -48,7 +48,8 @@ class Mover:
 
     def verdict(self, q_start: NDArray, q_end: NDArray, openings: tuple[float, float] | None = None, nearest: float = 0.0) -> Verdict:
         start, end = openings or (self.opening, self.opening)
-        motion = Motion(np.ascontiguousarray(q_start, dtype=float), np.ascontiguousarray(q_end, dtype=float), float(start), float(end))
+        # Copies: a read-only array is another type to the compiler, and would compile everything anew.
+        motion = Motion(np.array(q_start, dtype=float), np.array(q_end, dtype=float), float(start), float(end))
         return Verdict(*prove(self.model.chain, self.bodies.shapes, self.scene, motion, float(self.margin), float(nearest)))
 
 

@@ -56,7 +56,7 @@ def find_cells(blocked: NDArray, start: tuple[int, int, int], goal: tuple[int, i
 
     Two free cells that share a corner hold it both, so the straight line between their centres stays in them.
     """
-    return _astar(np.ascontiguousarray(blocked), np.array(start, dtype=np.int64), np.array(goal, dtype=np.int64))
+    return _astar(np.array(blocked), np.array(start, dtype=np.int64), np.array(goal, dtype=np.int64))
 
 
 @njit(cache=True)

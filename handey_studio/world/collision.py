@@ -125,7 +125,7 @@ class CollisionModel:
 
     def clearance(self, q: NDArray, opening: float, held: Held | None = None, allowed: Pairs = (), limit: float = FAR_M) -> Clearance:
         """Least distance of the whole arm at q (n,) [rad]; with no pair nearer than `limit` that number and no names."""
-        return self._clearance(forward(self.chain, np.asarray(q, dtype=float)), opening, held, allowed, limit, self.bodies(held))
+        return self._clearance(forward(self.chain, np.array(q, dtype=float)), opening, held, allowed, limit, self.bodies(held))
 
     def in_contact(
         self, q: NDArray, opening: float, held: Held | None = None, allowed: Pairs = (), margin: float = 0.0

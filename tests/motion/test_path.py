@@ -6,8 +6,8 @@ import pytest
 from handey_studio.base import BadInput
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import transform
-from handey_studio.motion import PathOptions, certify, plan_path, straight_path
-from handey_studio.world import Block, Held, Part, World, arm_of
+from handey_studio.motion import PathOptions, certify, configuration_space, distance_field, plan_path, proof, search, straight_path, warm_up
+from handey_studio.world import Block, Held, Part, World, arm_of, collision_queries, gjk
 from handey_studio.world.collision import collision_model
 from tests.motion.oracle import DOWN, ROBOT, Judge, reach, scene
 
@@ -200,3 +200,23 @@ def test_straight_motion():
     assert "out of reach" in straight_path(world, start, far, 0.05).reason or "jump" in straight_path(world, start, far, 0.05).reason
     with pytest.raises(BadInput):
         straight_path(world, start, np.zeros((0, 4, 4)), 0.05)
+
+
+def test_warmed_up_nothing_is_left_to_compile():
+    warm_up(ROBOT)
+    compiled = _signatures()
+    rng = np.random.default_rng(0)
+    model = collision_model(scene(0))
+    held = Held("brick#1", BRICK, transform(None, [0.0, 0.0, 0.01]))
+    model.clearance(ROBOT.home, 0.04, held, [("brick#1", "table")])
+    found = plan_path(scene(0), reach(model, rng), ROBOT.home, 0.05)
+    certify(scene(0), found.q_rad, 0.05)
+    straight_path(scene(0), ROBOT.home, arm_of(ROBOT).hand_pose(ROBOT.home)[None], 0.05)
+    assert _signatures() == compiled and len(compiled) > 20
+
+
+def _signatures() -> dict[str, int]:
+    """Compiled versions of each function of collision and motion."""
+    modules = (gjk, collision_queries, proof, configuration_space, distance_field, search)
+    functions = [(m.__name__, f) for m in modules for f in vars(m).values() if hasattr(f, "signatures") and f.__module__ == m.__name__]
+    return {f"{name}.{f.__name__}": len(f.signatures) for name, f in functions}
