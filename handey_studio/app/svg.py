@@ -75,7 +75,7 @@ def _cells(frame: _Frame, filled: NDArray, colour: str) -> str:
     pixels = frame.pixels(frame.origin + frame.cell * corners.reshape(-1, 2)).reshape(-1, 4, 2)
     inside = ((pixels.max(axis=1) > 0) & (pixels.min(axis=1) < SIZE)).all(axis=1)
     quads = "".join("M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in quad) + "Z" for quad in np.clip(pixels[inside], -5, SIZE + 5))
-    return f'<path d="{quads}" fill="{colour}"/>'
+    return f'<path d="{quads}" fill="{colour}" shape-rendering="crispEdges"/>'
 
 
 def _axes(angle: float) -> NDArray:

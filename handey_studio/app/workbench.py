@@ -26,6 +26,7 @@ log = logging.getLogger(__name__)
 FRAME_S = 1.0 / 30.0
 IDLE_S = 0.25
 NOTICE_S = 7.0
+FIELD_OF_VIEW_RAD = float(np.deg2rad(40.0))
 NOTICE_LOOKS = {"info": ("Handey Studio", BLUE), "good": ("Done", TEAL), "bad": ("That did not work", VERMILLION)}
 
 
@@ -41,7 +42,7 @@ class Workbench:
         self._running.set()
         self.planner = Planner(run, lambda message: self.send(heard(message)))
         self._view = View(server, self.send)
-        self._point_camera(self.state.session)
+        self._start_from(session.view.camera_position, session.view.camera_look_at)
         self._view.render(None, self.state)
         server.on_client_connect(self._arrived)
         server.on_client_disconnect(lambda _: self.send(Viewers(-1)))
@@ -69,8 +70,9 @@ class Workbench:
 
     def look(self, position: NDArray, look_at: NDArray, client: int | None) -> None:
         """Point one browser's camera, or everyone's."""
-        clients = self.server.get_clients()
-        for number, handle in clients.items():
+        if client is None:
+            self._start_from(position, look_at)
+        for number, handle in self.server.get_clients().items():
             if client in (None, number):
                 with handle.atomic():
                     handle.camera.position = position * SCALE
@@ -135,11 +137,12 @@ class Workbench:
 
         client.camera.on_update(moved)
 
-    def _point_camera(self, session: Session) -> None:
+    def _start_from(self, position: NDArray, look_at: NDArray) -> None:
+        """Where the cameras of browsers yet to come begin."""
         camera = self.server.initial_camera
-        camera.position = tuple(session.view.camera_position * SCALE)
-        camera.look_at = tuple(session.view.camera_look_at * SCALE)
-        camera.fov = float(np.deg2rad(40.0))
+        camera.position = tuple(position * SCALE)
+        camera.look_at = tuple(look_at * SCALE)
+        camera.fov = FIELD_OF_VIEW_RAD
 
 
 def heard(message: Any) -> Any:

@@ -56,6 +56,12 @@ class Replay(Value):
         opening = float(np.interp(local, step.time_s, step.hand_opening_m))
         return Moment(time_s, number, q, opening, step.held, self._part_pose(number, q))
 
+    def let_go(self, time_s: float) -> bool:
+        """Whether the part was carried and let go before a time [s]."""
+        number = self.step_at(time_s)
+        steps = self.plan.steps
+        return steps[number].held is None and any(step.held is not None for step in steps[:number])
+
     def hand_path(self, samples: int = 400) -> NDArray:
         """Where the fingertips' middle goes: points (n, 3) [m] in the world, evenly in time."""
         q = np.array([self.at(t).q_rad for t in np.linspace(0.0, self.duration, samples)])

@@ -22,8 +22,8 @@ class ViewState(Value):
     `hypothesis` and `edge` count into what was sensed, -1 for none; `result` counts the session's results, -1 for the last.
     """
 
-    camera_position: NDArray = field(default_factory=lambda: np.array([1.85, -1.30, 1.15]))
-    camera_look_at: NDArray = field(default_factory=lambda: np.array([0.27, 0.02, 0.20]))
+    camera_position: NDArray = field(default_factory=lambda: np.array([1.56, -1.10, 0.98]))
+    camera_look_at: NDArray = field(default_factory=lambda: np.array([0.29, 0.01, 0.16]))
     time_s: float = 0.0
     hypothesis: int = -1
     edge: int = -1

@@ -22,7 +22,7 @@ def test_the_page_shows_the_cell_and_says_what_to_do(studio, visit, tmp_path):
     page = visit(workbench, viewport=LARGE)
     ARTEFACTS.mkdir(parents=True, exist_ok=True)
     (ARTEFACTS / "page_usable_s.txt").write_text(f"{time.monotonic() - begun:.2f}\n")
-    assert "Planned" in pane(page, "next-step").inner_text()
+    wait_until(lambda: "Planned" in pane(page, "next-step").inner_text())
     assert "transfer" in pane(page, "timeline").inner_text()
     time.sleep(3.0)
     shot = page.screenshot(path=ARTEFACTS / "workbench.png")

@@ -63,17 +63,26 @@ class DestinationScene:
         place(self._gizmo, pose)
         fixed = (state.command is not None and state.command.to.startswith("on:")) or state.job is not None
         self._gizmo.disable_axes = self._gizmo.disable_sliders = self._gizmo.disable_rotations = fixed
-        self._gizmo.visible = "destination" not in state.session.view.hidden_layers
+        self._gizmo.visible = "destination" not in state.session.view.hidden_layers and not _arrived(state)
 
 
 def ghost_pose(state: State) -> NDArray | None:
     """T_world_part of the destination, None when it is not known yet or the command means nothing here."""
+    result = state.session.result
     if state.command is None:
         return None
+    if result is not None and result.command == state.command and result.T_world_part_goal is not None:
+        return result.T_world_part_goal  # of several instances and places, the one that was planned for
     try:
         return destination_pose(state.session, state.command)
     except BadInput:
         return None
+
+
+def _arrived(state: State) -> bool:
+    """Whether the part stands at its destination at the time that is looked at, so that a ghost there would only blur it."""
+    replay = state.replay
+    return replay is not None and replay.let_go(state.session.view.time_s) and replay.plan.T_world_part_goal is ghost_pose(state)
 
 
 def _pose_of(gizmo: Any) -> NDArray:
@@ -82,4 +91,4 @@ def _pose_of(gizmo: Any) -> NDArray:
 
 def _looks(state: State) -> tuple:
     session = state.session
-    return state.loads, session.commands, session.located, session.view.hidden_layers, state.job is None
+    return state.loads, session.commands, session.located, session.view.hidden_layers, state.job is None, session.result, _arrived(state)
