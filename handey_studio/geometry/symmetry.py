@@ -4,7 +4,7 @@ from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from handey_studio.base import frozen_array
 from handey_studio.geometry.polyhedron import Polyhedron
@@ -21,7 +21,7 @@ def symmetries(solid: Polyhedron, tolerance: float = SAME_M) -> NDArray:
     """
     centre = solid.volume_and_centroid[1]
     corners = solid.vertices - centre
-    tree = cKDTree(corners)
+    tree = KDTree(corners)
     radii = np.linalg.norm(corners, axis=1)
     first, second = _frame_corners(corners)
     found = [np.eye(4)]

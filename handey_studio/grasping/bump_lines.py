@@ -47,7 +47,8 @@ class BumpLines(Value):
 class BumpRun(Value):
     """One run of the planner. `path` (k, 3): fingertip point y, z [m] and angle [rad] in the grasp plane, start first.
 
-    `status`: reached, stuck (no motion is left), or iterations (the limit was hit). `distance` [m] is what remained, `threshold` [m] what had to.
+    `status`: reached, stuck (no motion is left), iterations (the limit was hit), or blocked start. `distance` [m] is what remained, and
+    `threshold` [m] what had to be come under.
     """
 
     plane: GraspPlane

@@ -35,6 +35,12 @@ class GraspClass(Value):
     contact: shapely.Geometry
 
     @property
+    def outline(self) -> NDArray:
+        """Corners (k, 2) [m] of the largest piece of `contact`."""
+        polygons = [piece for piece in shapely.get_parts(self.contact) if isinstance(piece, shapely.Polygon)]
+        return shapely.get_coordinates(max(polygons, key=lambda polygon: polygon.area).exterior) if polygons else np.empty((0, 2))
+
+    @property
     def name(self) -> str:
         return f"faces {self.faces[0]}–{self.faces[1]} ({1e3 * self.width:.0f} mm)"
 

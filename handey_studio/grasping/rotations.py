@@ -51,12 +51,12 @@ class LegalRotations(Value):
     @property
     def legal_at(self) -> NDArray:
         """Whether each angle is legal (k, 2) at pickup and at putdown."""
-        return (self.clearances >= HAND_MARGIN_M) & (self.areas >= self.min_area)[:, None]
+        return np.logical_and(self.clearances >= HAND_MARGIN_M, (self.areas >= self.min_area)[:, None])
 
     @property
     def legal(self) -> NDArray:
         """Whether each angle is legal (k,) at both ends."""
-        return self.legal_at.all(axis=1)
+        return np.asarray(self.legal_at.all(axis=1))
 
     def ranges(self) -> list[tuple[float, float]]:
         """Runs of neighbouring legal angles as (first, last) [rad]."""

@@ -6,6 +6,7 @@ the map with it, and only those; what it stood on stays solid up to the part's u
 """
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -47,11 +48,11 @@ def explained_tolerance(depth_map: DepthMap) -> float:
 
 def _rim(elevation: NDArray) -> NDArray:
     """For every hole cell the greatest elevation around its hole; where a hole has no rim at all, infinity."""
-    labels, count = ndimage.label(np.isnan(elevation), structure=np.ones((3, 3)))
+    found: Any = ndimage.label(np.isnan(elevation), structure=np.ones((3, 3)))
+    labels, count = found
     around = ndimage.maximum_filter(np.where(np.isnan(elevation), -np.inf, elevation), size=3)
-    rims = ndimage.maximum(around, labels, index=np.arange(1, count + 1)) if count else np.empty(0)
-    rims = np.where(np.isfinite(rims), rims, np.inf)
-    return np.concatenate([[0.0], np.atleast_1d(rims)])[labels]
+    rims = np.atleast_1d(ndimage.maximum(around, labels, index=np.arange(1, count + 1))) if count else np.empty(0)
+    return np.concatenate([[0.0], np.where(np.isfinite(rims), rims, np.inf)])[labels]
 
 
 @njit(cache=True)
@@ -95,7 +96,7 @@ def _explained(depth_map: DepthMap, placed: PlacedPart) -> tuple[NDArray, NDArra
         return footprint, underside
     reach = int(np.ceil(tolerance / depth_map.cell))
     near = ndimage.binary_dilation(footprint, ndimage.generate_binary_structure(2, 2), iterations=reach + 1)
-    nearest = ndimage.distance_transform_edt(~footprint, return_distances=False, return_indices=True)
+    nearest: Any = ndimage.distance_transform_edt(~footprint, return_distances=False, return_indices=True)
     underside = underside[nearest[0], nearest[1]]
     j, i = np.nonzero(near)
     cells = np.c_[(i + 0.5) * depth_map.cell, (j + 0.5) * depth_map.cell]
@@ -104,8 +105,8 @@ def _explained(depth_map: DepthMap, placed: PlacedPart) -> tuple[NDArray, NDArra
     seen = ~own[j, i]
     points = np.c_[cells[seen], depth_map.elevation[j[seen], i[seen]]]
     own[j[seen], i[seen]] = _outside_by(placed.part, apply(inverse(T_range_part), points)) <= tolerance
-    gap = ndimage.distance_transform_edt(~footprint) * depth_map.cell
-    own &= ~(np.isnan(depth_map.elevation) & (gap > tolerance))
+    gap: Any = ndimage.distance_transform_edt(~footprint)
+    own &= ~(np.isnan(depth_map.elevation) & (gap * depth_map.cell > tolerance))
     return own, underside
 
 

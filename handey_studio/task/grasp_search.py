@@ -158,7 +158,6 @@ def _choice(
 ) -> GraspChoice:
     group, hand = option.group, option.goal.at_start.robot.hand
     T_part_plane = group.grasp_class.T_part_plane
-    outline = np.array(group.grasp_class.contact.exterior.coords) if group.grasp_class.contact.geom_type == "Polygon" else np.empty((0, 2))
     return GraspChoice(
         name=group.grasp_class.name,
         faces=group.grasp_class.faces,
@@ -166,7 +165,7 @@ def _choice(
         T_hand_part=inverse(T_part_hand),
         T_part_plane=T_part_plane,
         edge_part=_in_part(T_part_plane, group.edge),
-        contact_part=_in_part(T_part_plane, outline),
+        contact_part=_in_part(T_part_plane, group.grasp_class.outline),
         angle=float(final[2]),
         ranges=np.array(rotations.ranges()).reshape(-1, 2),
         tilts=tilts,
@@ -191,7 +190,7 @@ def reachable(world: World, T_world_hand: NDArray, opening: float, near: NDArray
     arm = arm_of(world.robot)
     branches = arm.nearest_turns(arm.ik(T_world_hand), near)
     if not len(branches):
-        distance = np.linalg.norm(T_world_hand[:3, 3] - world.robot.T_world_base[:3, 3])
+        distance = float(np.linalg.norm(T_world_hand[:3, 3] - world.robot.T_world_base[:3, 3]))
         ledger.add("reach", f"IK at the {where}", "out of the arm's reach", parent=entry, value=distance, unit="m")
         return []
     free = []

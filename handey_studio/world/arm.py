@@ -156,11 +156,12 @@ def _hulls(mesh: trimesh.Trimesh) -> tuple[NDArray, ...]:
     if not mesh.is_watertight or mesh.volume > FULL_SHARE * whole.volume:
         return (frozen_array(whole.vertices),)
     axis = np.eye(3)[int(np.argmax(mesh.extents))]
-    cuts = np.linspace(*(mesh.bounds @ axis), SLICES + 1)
+    low, high = (float(corner @ axis) for corner in mesh.bounds)
+    cuts = np.linspace(low, high, SLICES + 1)
     pieces = []
-    for low, high in pairwise(cuts):
-        piece = trimesh.intersections.slice_mesh_plane(mesh, axis, axis * low)
-        piece = trimesh.intersections.slice_mesh_plane(piece, -axis, axis * high)
+    for start, end in pairwise(cuts):
+        beyond = mesh.slice_plane(axis * start, axis)
+        piece = beyond.slice_plane(axis * end, -axis)
         pieces.append(frozen_array(piece.convex_hull.vertices))
     return tuple(pieces)
 
