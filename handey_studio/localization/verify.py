@@ -50,8 +50,9 @@ class Verdict(NamedTuple):
 
     @property
     def support(self) -> NDArray:
-        """Rank [m]: found less missing edge, less what is seen through, as a length."""
-        return self.found - self.missing - 2.0 * np.sqrt(self.through) - 2.0 * np.sqrt(self.taken)
+        """Rank [m]: found less missing edge, less what is seen through, as a length, times the shares that are right."""
+        balance = self.found - self.missing - 2.0 * np.sqrt(self.through) - 2.0 * np.sqrt(self.taken)
+        return balance * np.where(balance > 0, self.edge_share * self.surface_share**2, 1.0)
 
 
 def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, every: int = 1) -> Verdict:
