@@ -32,7 +32,7 @@ def symmetries(solid: Polyhedron, tolerance: float = SAME_M) -> NDArray:
             continue
         R = _basis(corners[i], corners[j]) @ _basis(corners[first], corners[second]).T
         distances, image = tree.query(corners @ R.T)
-        if distances.max() <= tolerance and _maps_faces(solid, image):
+        if distances.max() <= tolerance and _maps_faces(solid, np.asarray(image)):
             T = transform(R, centre - R @ centre)
             if all(np.abs(T[:3, :3] - S[:3, :3]).max() > 1e-3 for S in found):
                 found.append(T)

@@ -192,19 +192,24 @@ class CollisionModel:
 
     def _depth(self, hit: Hit, bodies: Bodies, placing: Placing) -> float:
         """How deep [m] two bodies overlap. A column is as narrow as the map's cell: many of them tell how deep a wide body stands."""
-        if hit.kind == 1:
-            column = self.terrain.corners[self.terrain.first[hit.other] : self.terrain.first[hit.other + 1]]
-            first = bodies.shapes.first
-            lift = float(column[:, 2].max() - placing.corners[first[hit.body] : first[hit.body + 1], 2].min())
-            if lift <= ALLOWED_DEPTH_M:  # raised by that much the body is clear: no need to ask for the least shift
-                return max(lift, 0.0)
-            return penetration(bodies.fcl_object(hit.body, placing), fcl_box(column))
-        mine = bodies.fcl_object(hit.body, placing)
+        mine = self._moving(hit.body, bodies, placing)
         if hit.kind == 2:
-            return penetration(mine, bodies.fcl_object(hit.other, placing))
+            theirs = self._moving(hit.other, bodies, placing)
+            return penetration(bodies.fcl_object(hit.body, placing), bodies.fcl_object(hit.other, placing), least_side(mine, theirs))
+        fixed = self.solids if hit.kind == 0 else self.terrain
+        corners = fixed.corners[fixed.first[hit.other] : fixed.first[hit.other + 1]]
+        most = least_side(mine, corners)
+        if most <= ALLOWED_DEPTH_M:  # so little that the exact depth would change nothing
+            return most
+        if hit.kind == 1:
+            return penetration(bodies.fcl_object(hit.body, placing), fcl_box(corners), most)
         if hit.other not in self._fixed:
-            self._fixed[hit.other] = fcl_convex(self.solids.corners[self.solids.first[hit.other] : self.solids.first[hit.other + 1]])
-        return penetration(mine, fcl.CollisionObject(self._fixed[hit.other]))
+            self._fixed[hit.other] = fcl_convex(corners)
+        return penetration(bodies.fcl_object(hit.body, placing), fcl.CollisionObject(self._fixed[hit.other]), most)
+
+    @staticmethod
+    def _moving(b: int, bodies: Bodies, placing: Placing) -> NDArray:
+        return placing.corners[bodies.shapes.first[b] : bodies.shapes.first[b + 1]]
 
 
 @lru_cache(maxsize=32)
@@ -213,10 +218,20 @@ def collision_model(world: World) -> CollisionModel:
     return CollisionModel(world)
 
 
-def penetration(one: fcl.CollisionObject, other: fcl.CollisionObject) -> float:
-    """Depth [m] that two convex bodies overlap by: the least shift that parts them, as FCL finds it; 0 when apart."""
+def penetration(one: fcl.CollisionObject, other: fcl.CollisionObject, most: float = np.inf) -> float:
+    """Depth [m] that two convex bodies overlap by: the least shift that parts them, as FCL finds it; 0 when apart.
+
+    `most` is a depth known to suffice (see `least_side`): FCL's own number is far too large where faces just touch.
+    """
     request, result = fcl.DistanceRequest(enable_signed_distance=True), fcl.DistanceResult()
-    return max(0.0, -fcl.distance(one, other, request, result))
+    return float(np.clip(-fcl.distance(one, other, request, result), 0.0, most))
+
+
+def least_side(one: NDArray, other: NDArray) -> float:
+    """The shift [m] along x, y or z that surely parts two bodies of corners (k, 3): the least overlap of their bounding boxes."""
+    low, high = np.maximum(one.min(axis=0), other.min(axis=0)), np.minimum(one.max(axis=0), other.max(axis=0))
+    along = np.minimum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0))
+    return float(max(along.min(), 0.0)) if (high >= low).all() else 0.0
 
 
 def fcl_box(corners: NDArray) -> fcl.CollisionObject:

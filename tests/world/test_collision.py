@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from handey_studio.geometry import box, prism
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
 from handey_studio.world import FINGERS, Block, Held, Part, PlacedPart, World, arm_of
-from handey_studio.world.collision import always_touching, collision_model, fcl_convex, penetration
+from handey_studio.world.collision import always_touching, collision_model, fcl_convex, least_side, penetration
 from handey_studio.world.gjk import distance
 from tests.motion.oracle import DOWN, ROBOT, Judge, scene
 
@@ -165,3 +165,14 @@ def test_a_turned_depth_map_stands_where_it_is():
     spot = turned.T_world_range @ [(i + 0.5) * field.cell, (j + 0.5) * field.cell, field.top[j, i] + 0.005, 1.0]
     found = collision_model(World(ROBOT, terrain=turned)).hand_contact(transform(DOWN[:3, :3], spot[:3]), 0.0)
     assert found.distance == pytest.approx(0.005, abs=5e-4) and found.bodies[1] == "depth map"
+
+
+def test_faces_that_just_touch_are_not_deep():
+    """FCL's own depth is metres off for a box that stands on a wide one; the bound from their sides corrects it."""
+    table = np.array([[x, y, z] for x in (-3.0, 3.0) for y in (-3.0, 3.0) for z in (-2.0, 0.0)])
+    for yaw in np.linspace(0.0, 3.0, 13):
+        brick = np.array([[x, y, z] for x in (-0.04, 0.04) for y in (-0.02, 0.02) for z in (-1e-5, 0.03)])
+        c, s = np.cos(yaw), np.sin(yaw)
+        brick = brick @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + (0.4, 0.3, 0.0)
+        objects = [fcl.CollisionObject(fcl_convex(corners)) for corners in (brick, table)]
+        assert penetration(*objects, least_side(brick, table)) <= 1e-5 + 1e-12
