@@ -1,0 +1,80 @@
+"""One look at a view: its edges, its evidence, and what the search for parts writes down."""
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Ledger
+from handey_studio.localization.edges import edge_pixels
+from handey_studio.localization.evidence import Evidence, evidence_of
+from handey_studio.localization.result import LocateOptions
+from handey_studio.localization.segments import DataEdge, data_edges, link
+from handey_studio.localization.surface import surface_of
+from handey_studio.sensing.depth_view import DepthView
+from handey_studio.world.part import Part
+
+MIN_EDGE_PX = 8.0
+STAGES = ("edges", "evidence", "hypothesize", "verify", "refine", "accept")
+TABLE_SHARE = 0.02  # of the readings that must lie at the table's height before the table is believed in
+
+
+@dataclass(frozen=True)
+class Search:
+    """What one call looks at; `ledger`, `fell` and `timing` are what it writes down, `evidence.taken` what is explained."""
+
+    view: DepthView
+    evidence: Evidence
+    edges: tuple[DataEdge, ...]
+    options: LocateOptions
+    pixel: float
+    table: bool
+    models: dict[str, Part]
+    ledger: Ledger
+    fell: Counter[str]
+    timing: dict[str, float]
+
+
+class Candidate(NamedTuple):
+    """A refined pose of one part."""
+
+    part: Part
+    R: NDArray
+    t: NDArray
+    margin: float
+    rms: float
+    data: tuple[int, ...]
+    entry: int
+
+
+def look(view: DepthView, parts: Sequence[Part], options: LocateOptions) -> Search:
+    """Edges and evidence of a view."""
+    timing: dict[str, float] = dict.fromkeys(STAGES, 0.0)
+    start = time.perf_counter()
+    surface = surface_of(view)
+    pixels = edge_pixels(view, surface)
+    linked = link(view, surface, pixels)
+    shortest = options.min_edge_m if options.min_edge_m is not None else MIN_EDGE_PX * surface.pixel
+    edges = data_edges(view, surface, pixels, linked, shortest)
+    timing["edges"] = time.perf_counter() - start
+    start = time.perf_counter()
+    evidence = evidence_of(view, surface, linked)
+    timing["evidence"] = time.perf_counter() - start
+    ledger = Ledger()
+    ledger.add("edges", f"{len(edges)} straight edges in the depth map", None if edges else "no straight edge found")
+    models = {part.name: part for part in parts}
+    return Search(view, evidence, edges, options, surface.pixel, _sees_table(view, options), models, ledger, Counter(), timing)
+
+
+def _sees_table(view: DepthView, options: LocateOptions) -> bool:
+    """Whether enough readings lie at the table's height for it to be there."""
+    if options.table_z_m is None:
+        return False
+    points = view.points_sensor()
+    z = points @ view.T_world_sensor[2, :3] + view.T_world_sensor[2, 3] - options.table_z_m
+    z = z[np.isfinite(z)]
+    return bool(len(z)) and bool(np.mean(np.abs(z) < 5.0 * view.noise) > TABLE_SHARE)
