@@ -17,6 +17,9 @@ from handey_studio.sensing.depth_view import Pinhole
 
 AREA_M = 0.4
 SAME_SURFACE = 6.0  # readings of one cell within this many standard deviations of its highest are of one surface
+NEIGHBOURS = tuple((dj, di) for dj in (-1, 0, 1) for di in (-1, 0, 1) if (dj, di) != (0, 0))
+SPECK_SLOPE = 5.0  # surfaces steeper than this are not read: neighbours that differ by more than this many cells are not one surface
+SPECK_NEIGHBOURS = 2
 PINHOLE_NEIGHBOURS = 6  # a cell without a reading is a pinhole if so many of its eight neighbours have one
 PINHOLE_SLOPE = 4.0  # and they differ by no more than this many cells in height: a steep face, not a step
 
@@ -134,7 +137,7 @@ def fuse(finder: RangeFinder, points_range: NDArray) -> DepthMap:
         mean = np.bincount(number[top], weights=z[top], minlength=ny * nx) / count
     readings = max(1.0, float(np.median(count[count > 0]))) if kept.any() else 1.0
     return DepthMap(
-        elevation=_without_pinholes(mean.reshape(ny, nx), PINHOLE_SLOPE * finder.cell),
+        elevation=_without_pinholes(_without_specks(mean.reshape(ny, nx), SPECK_SLOPE * finder.cell), PINHOLE_SLOPE * finder.cell),
         cell=finder.cell,
         T_world_range=finder.T_world_range,
         lights=finder.laser[None],
@@ -144,12 +147,24 @@ def fuse(finder: RangeFinder, points_range: NDArray) -> DepthMap:
     )
 
 
+def _without_specks(elevation: NDArray, tolerance: float) -> NDArray:
+    """Without readings that fewer than `SPECK_NEIGHBOURS` of their neighbours share within `tolerance` [m].
+
+    A stripe that an edge splits between two surfaces has its peak between them, and gives a reading in the air.
+    """
+    padded = np.pad(elevation, 1, constant_values=np.nan)
+    ny, nx = elevation.shape
+    alike = np.zeros((ny, nx), dtype=int)
+    for dj, di in NEIGHBOURS:
+        alike += np.abs(padded[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] - elevation) <= tolerance
+    return np.where(alike >= SPECK_NEIGHBOURS, elevation, np.nan)
+
+
 def _without_pinholes(elevation: NDArray, tolerance: float) -> NDArray:
     """Empty cells whose neighbours lie within `tolerance` [m] of each other, filled with their median."""
     padded = np.pad(elevation, 1, constant_values=np.nan)
     j, i = np.nonzero(np.isnan(elevation))
-    shifts = [(dj, di) for dj in (0, 1, 2) for di in (0, 1, 2) if (dj, di) != (1, 1)]
-    around = np.sort(np.stack([padded[j + dj, i + di] for dj, di in shifts], axis=1), axis=1)  # NaN sorts last
+    around = np.sort(np.stack([padded[1 + j + dj, 1 + i + di] for dj, di in NEIGHBOURS], axis=1), axis=1)  # NaN sorts last
     known = np.isfinite(around).sum(axis=1)
     enough = known >= PINHOLE_NEIGHBOURS
     j, i, around, known = j[enough], i[enough], around[enough], known[enough]

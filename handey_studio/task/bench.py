@@ -10,7 +10,7 @@ import numpy as np
 
 from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.checker import CheckReport, Violation, check_plan, names_in_plan
+from handey_studio.cell.checker import Violation, check_plan, names_in_plan
 from handey_studio.cell.piles import Pile, random_pile
 from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.geometry.transforms import pose_difference
@@ -55,7 +55,7 @@ def _row(seed: int, pile: Pile, library: Library) -> dict[str, Any]:
     scene, result = run_move(station, cell, MoveCommand(pile.part, pile.to), MoveOptions(seed=seed))
     total = time.perf_counter() - begun
     off = _off(pile, station, cell) if result.status == "done" else (None, None)
-    report = judge(scene, result.plan, before, robot) if scene is not None and result.plan is not None else None
+    wrong = judge(scene, result.plan, before, robot) if scene is not None and result.plan is not None else None
     return {
         "seed": seed,
         "part": pile.part,
@@ -67,7 +67,7 @@ def _row(seed: int, pile: Pile, library: Library) -> dict[str, Any]:
         "timing_s": {stage: result.timing_s.get(stage, 0.0) for stage in STAGES},
         "off_mm": off[0],
         "off_deg": off[1],
-        "violations": None if report is None else [_violation(violation) for violation in report.violations],
+        "violations": wrong,
     }
 
 
@@ -76,10 +76,14 @@ def _violation(violation: Violation) -> str:
     return f"{violation.kind}: {violation.reason}{bodies}: {violation.value:.4g} {violation.unit}, limit {violation.limit:.4g}"
 
 
-def judge(scene: Scene, plan: MovePlan, bodies: tuple[SolidBody, ...], robot: Robot) -> CheckReport:
-    """The independent check of a plan against the true bodies as they stood before it."""
+def judge(scene: Scene, plan: MovePlan, bodies: tuple[SolidBody, ...], robot: Robot) -> list[str]:
+    """What the independent check finds wrong with a plan against the true bodies as they stood before it."""
     located = {placed.name: placed.T_world_part for placed in scene.instances}
-    return check_plan(plan.steps, bodies, robot, names_in_plan(bodies, located))
+    try:
+        report = check_plan(plan.steps, bodies, robot, names_in_plan(bodies, located))
+    except BadInput as error:
+        return [str(error)]  # what the plan takes for the part is none of the bodies
+    return [_violation(violation) for violation in report.violations]
 
 
 def _off(pile: Pile, station: Station, cell: SimulatedCell) -> tuple[float, float]:
