@@ -1,6 +1,19 @@
 """What to do next, said in one sentence for every state that the workbench can be in."""
 
-from handey_studio.app.state import State
+from handey_studio.app.state import Job, State
+from handey_studio.session.run import PLANNED, SENSED
+
+STAGES = (("Sense", 0.0), ("Plan", SENSED), ("Execute", PLANNED))
+
+
+def stages(job: Job) -> list[tuple[str, str]]:
+    """Each stage of a job and whether it is done, now or later."""
+    named = STAGES if job.execute else STAGES[:2]
+    ends = [start for _, start in named[1:]] + [1.01]
+    return [
+        (name, "done" if job.fraction >= end else "now" if job.fraction >= start else "later")
+        for (name, start), end in zip(named, ends, strict=True)
+    ]
 
 
 def next_step(state: State) -> tuple[str, str, str]:

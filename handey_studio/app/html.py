@@ -42,12 +42,27 @@ def empty(text: str, testid: str = "") -> str:
     )
 
 
+def stage_chips(stages: Iterable[tuple[str, str]]) -> str:
+    """Stages in a row: a tick for what is done, bold for what runs now."""
+    marks = {"done": "✓", "now": "●", "later": "○"}
+    weights = {"done": "500;opacity:.75", "now": "700", "later": "400;opacity:.5"}
+    row = "".join(f'<span style="font-weight:{weights[when]}">{marks[when]} {esc(name)}</span>' for name, when in stages)
+    return f'<div data-testid="stages" style="display:flex;gap:16px;margin:2px 16px 6px;font-size:12.5px">{row}</div>'
+
+
 def swatch(colour: palette.RGB, label: str) -> str:
     """A coloured chip and what it means."""
     return (
         f'<span style="display:inline-flex;align-items:center;gap:6px;margin-right:12px"><span style="width:11px;height:11px;'
         f'border-radius:3px;background:{css(colour)}"></span>{esc(label)}</span>'
     )
+
+
+def figure(svg: str, chips: Iterable[tuple[palette.RGB, str]], words: str) -> str:
+    """A picture, what its colours mean, and a sentence about it."""
+    row = "".join(swatch(colour, label) for colour, label in chips)
+    legend = f'<div style="margin-top:4px">{row}</div><div>{esc(words)}</div>'
+    return f'<div style="margin:6px 14px;font-size:12px;line-height:1.7">{svg}{legend}</div>'
 
 
 def millimetres(metres: float, digits: int = 0) -> str:

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 import viser
 
 from handey_studio.app import palette
-from handey_studio.app.panels.findings import GraspPanel, ResultPanel
+from handey_studio.app.panels.findings import GraspPanel, PathPanel, ResultPanel
 from handey_studio.app.panels.ledger import LedgerPanel
 from handey_studio.app.panels.looking import LookingPanel
 from handey_studio.app.panels.move import MovePanel
@@ -71,6 +71,8 @@ def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
         located = SensingPanel(gui, send)
     with tabs.add_tab("Grasp"):
         grasp = GraspPanel(gui)
+    with tabs.add_tab("Path"):
+        path = PathPanel(gui)
     with tabs.add_tab("Ledger"):
         ledger = LedgerPanel(gui, send)
-    return [result, located, grasp, ledger]
+    return [result, located, grasp, path, ledger]

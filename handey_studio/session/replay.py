@@ -62,6 +62,14 @@ class Replay(Value):
         steps = self.plan.steps
         return steps[number].held is None and any(step.held is not None for step in steps[:number])
 
+    def share_of(self, kind: str, time_s: float) -> float:
+        """How much of the first step of a kind is done at a time [s]: 0 before it, 1 after it."""
+        number = next((k for k, step in enumerate(self.plan.steps) if step.kind == kind), None)
+        if number is None:
+            return 1.0
+        start, end = self.starts[number], self.starts[number + 1]
+        return float(np.clip((time_s - start) / max(end - start, 1e-9), 0.0, 1.0))
+
     def hand_path(self, samples: int = 400) -> NDArray:
         """Where the fingertips' middle goes: points (n, 3) [m] in the world, evenly in time."""
         q = np.array([self.at(t).q_rad for t in np.linspace(0.0, self.duration, samples)])

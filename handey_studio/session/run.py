@@ -12,6 +12,8 @@ from handey_studio.task import MoveOptions, MoveResult, Station, check_command, 
 from handey_studio.task.run import Share
 from handey_studio.world import Library
 
+SENSED, PLANNED = 0.25, 0.9  # how much of a whole MOVE's progress is behind when it is sensed, and when it is planned
+
 
 class ShowingProgress(Progress, Protocol):
     """Progress that can also show what was found so far."""
@@ -30,18 +32,18 @@ def run_session(session: Session, library: Library, execute: bool, progress: Sho
     check_command(command, station.models)
     cell = cell_of(session, library)
     try:
-        scene = sense(station, cell, session.seed, Share(progress, 0.0, 0.25))
+        scene = sense(station, cell, session.seed, Share(progress, 0.0, SENSED))
     except CannotAct as error:
         return replace(session, scene=None, results=(MoveResult(command, "failed", str(error)),))
     session = replace(session, scene=scene, results=())
     progress.show(session)
     options = MoveOptions(seed=session.seed)
-    result = plan_in(station, scene, command, cell.joints(), cell.opening(), options, Share(progress, 0.25, 0.9))
+    result = plan_in(station, scene, command, cell.joints(), cell.opening(), options, Share(progress, SENSED, PLANNED))
     session = replace(session, results=(result,))
     if not execute or result.plan is None or progress.cancelled:
         return session
     progress.show(session)
-    result = execute_in(station, scene, result, cell, Share(progress, 0.9, 1.0))
+    result = execute_in(station, scene, result, cell, Share(progress, PLANNED, 1.0))
     return replace(session, results=(result,), cell_now=setup_of(session, cell))
 
 

@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from handey_studio.app import html
+from handey_studio.app.cspace import nearest, slice_svg
 from handey_studio.app.palette import elevation_colours
 from handey_studio.app.panels.findings import grasp_facts, result_html
 from handey_studio.app.panels.ledger import ledger_html
 from handey_studio.app.panels.sensing import edge_labels, found_html, hypothesis_labels, number_of, picked
 from handey_studio.app.panels.timeline import strip
 from handey_studio.app.scene.depth import elevation_span, stride_of, thinned
-from handey_studio.app.svg import SIZE, grasp_plane_svg
+from handey_studio.app.svg import grasp_plane_svg
+from handey_studio.motion import CSpaceSummary
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session import Replay
 from handey_studio.session.looking import unexplained
@@ -37,7 +39,26 @@ def test_the_grasp_plane_shows_world_up_up_and_the_hand_where_it_ends(session, r
     assert len(points) == len(run.path) and points[0][1] < points[-1][1], "the hand comes down"
     goal = re.search(r'<circle cx="([\d.-]+)" cy="([\d.-]+)"', svg)
     assert np.hypot(float(goal[1]) - points[-1][0], float(goal[2]) - points[-1][1]) < 1.0
-    assert all(-6 <= float(n) <= SIZE + 6 for n in re.findall(r"[ML]([\d.-]+) ", re.search(r'<path d="([^"]+)"', svg)[1]))
+
+
+def test_filled_cells_are_drawn_where_they_are(session, robot):
+    run = session.results[0].plan.approach
+    svg = grasp_plane_svg(run, robot.hand)
+    a, b, c, d, e, f = map(float, re.search(r"matrix\(([^)]+)\)", svg)[1].split())
+    goal = re.search(r'<circle cx="([\d.-]+)" cy="([\d.-]+)"', svg)
+    i, k = (run.goal - run.plane.origin) / run.plane.cell
+    np.testing.assert_allclose((a * k + c * i + e, b * k + d * i + f), (float(goal[1]), float(goal[2])), atol=0.1)
+
+
+def test_the_slice_of_the_configuration_space_is_the_one_that_the_arm_is_in():
+    centres = tuple(np.deg2rad(np.arange(-175.0, 180.0, 10.0)) for _ in range(3))
+    blocked = np.zeros((36, 36, 36), dtype=bool)
+    space = CSpaceSummary(np.deg2rad(10), centres, blocked, np.array([[3, 4, 5], [3, 5, 5]]), None, None, np.zeros((8, 3)), 3, 1)
+    assert nearest(centres[0], np.deg2rad(-147.0)) == 3
+    assert nearest(centres[0], np.deg2rad(-147.0 + 360.0)) == 3
+    svg = slice_svg(space, np.deg2rad([-145.0, -135.0, -125.0]), 3)
+    assert svg.count("<rect") == 2 and 'cx="4.50" cy="30.50"' in svg and 'points="4.5,30.5 5.5,30.5"' in svg
+    assert slice_svg(space, np.zeros(3), 4).count("<rect") == 0
 
 
 def test_words_of_others_are_escaped_everywhere(session):

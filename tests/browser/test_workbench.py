@@ -11,6 +11,8 @@ from tests.browser.hands import choose, fields, pane, press, says, type_into, wa
 from tests.browser.planners import dying, patient, refusing
 from tests.session.samples import fresh_session, full_session, library
 
+EMPTY = {"Located": "sensing"}
+
 
 def destination(workbench) -> list[float]:
     return [float(word) for word in workbench.state.command.to.split(",")]
@@ -33,9 +35,9 @@ def test_an_empty_workbench_tells_how_to_fill_it(studio, visit, tmp_path):
     page = visit(studio(fresh_session(tmp_path)))
     assert "Ready to MOVE" in pane(page, "next-step").inner_text()
     assert "Press Plan or MOVE" in pane(page, "timeline-empty").inner_text()
-    for tab, empty in (("Located", "sensing-empty"), ("Grasp", "grasp-empty"), ("Ledger", "ledger-empty"), ("Result", "result-empty")):
+    for tab in ("Located", "Grasp", "Path", "Ledger", "Result"):
         page.get_by_role("tab", name=tab).click()
-        pane(page, empty).wait_for()
+        pane(page, f"{EMPTY.get(tab, tab.lower())}-empty").wait_for()
 
 
 def test_what_the_user_set_is_undone_and_redone(studio, visit, tmp_path):
@@ -191,7 +193,7 @@ def test_names_from_a_file_cannot_run_as_script(studio, visit, tmp_path):
     result = replace(full.results[0], ledger=entries, reason=evil, status="failed")
     session = replace(full, scene=replace(full.scene, instances=instances), results=(result,))
     page = visit(studio(session))
-    for tab in ("Located", "Grasp", "Ledger", "Result"):
+    for tab in ("Located", "Grasp", "Path", "Ledger", "Result"):
         page.get_by_role("tab", name=tab).click()
         time.sleep(0.3)
     assert page.evaluate("window.hacked") is None

@@ -4,12 +4,16 @@ import numpy as np
 import viser
 
 from handey_studio.app import html
+from handey_studio.app.cspace import slice_html
 from handey_studio.app.state import State
 from handey_studio.app.svg import grasp_plane_html
+from handey_studio.app.wire import set_to
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.task.plan import MovePlan, MoveResult
 
 NO_RESULT = "No MOVE was tried yet. Set the part and its destination on the left, then press Plan or MOVE."
+NO_PATH = "No path yet. A plan shows here what was proved of it, and the arm's way through the configuration space."
+NO_SPACE = "This plan kept no picture of its configuration space."
 NO_GRASP = "No grasp yet. A plan shows here which faces are held, how the hand comes in, and what stood in its way."
 
 
@@ -27,19 +31,42 @@ class ResultPanel:
 
 
 class GraspPanel:
-    """The grasp in words and numbers, and the picture of the grasp plane."""
+    """The grasp in words and numbers, and the picture of the grasp plane with the hand where the timeline has it."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._pane = gui.add_html("")
 
     def render(self, old: State | None, new: State) -> None:
-        if old is not None and old.session.result is new.session.result and old.loads == new.loads:
-            return
-        plan = new.session.result.plan if new.session.result else None
-        if plan is None:
-            self._pane.content = html.empty(NO_GRASP, "grasp-empty")
-        else:
-            self._pane.content = html.facts(grasp_facts(plan), "grasp") + grasp_plane_html(plan.approach, new.robot.hand)
+        replay = new.replay
+        if replay is None:
+            set_to(self._pane, content=html.empty(NO_GRASP, "grasp-empty"))
+        elif old is None or old.session.result is not new.session.result or approach_point(old) != approach_point(new):
+            picture = grasp_plane_html(replay.plan.approach, new.robot.hand, approach_point(new))
+            self._pane.content = html.facts(grasp_facts(replay.plan), "grasp") + picture
+
+
+class PathPanel:
+    """The path's certificate, and the slice of the configuration space that the arm is in."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._pane = gui.add_html("")
+
+    def render(self, old: State | None, new: State) -> None:
+        replay = new.replay
+        if replay is None:
+            set_to(self._pane, content=html.empty(NO_PATH, "path-empty"))
+        elif old is None or old.session.result is not new.session.result or old.session.view.time_s != new.session.view.time_s:
+            space, moment = replay.plan.space, replay.at(new.session.view.time_s)
+            picture = slice_html(space, moment.q_rad) if space is not None else html.empty(NO_SPACE)
+            self._pane.content = html.facts(path_facts(replay.plan), "path") + picture
+
+
+def approach_point(state: State) -> int:
+    """How far along the approach in the grasp plane the hand is: a number of a point of its path."""
+    replay = state.replay
+    if replay is None:
+        return 0
+    return round(replay.share_of("approach", state.session.view.time_s) * (len(replay.plan.approach.path) - 1))
 
 
 def result_html(result: MoveResult) -> str:
@@ -49,7 +76,7 @@ def result_html(result: MoveResult) -> str:
     said = {"planned": "Planned, not carried out yet.", "done": "Done."}.get(result.status, result.reason)
     pane = html.card(title, said, tone, "result")
     if result.plan is not None:
-        pane += html.facts(plan_facts(result.plan))
+        pane += html.facts([*plan_facts(result.plan), *path_facts(result.plan)[:3]])
     if result.T_world_part_reached is not None and result.plan is not None:
         metres, radians = pose_difference(result.T_world_part_reached, result.plan.T_world_part_goal)
         pane += html.facts([("Reached within", f"{1e3 * metres:.2f} mm, {np.rad2deg(radians):.2f}°")])
@@ -59,15 +86,20 @@ def result_html(result: MoveResult) -> str:
 
 
 def plan_facts(plan: MovePlan) -> list[tuple[str, str]]:
-    """A plan's steps and what was proved of them."""
-    certificate = plan.certificate
-    proof = "proved collision-free" if certificate.proved else f"not proved: {certificate.reason}"
+    """A plan's steps."""
     seconds = sum(float(step.time_s[-1]) for step in plan.steps)
+    return [("Steps", " → ".join(step.kind for step in plan.steps)), ("Duration", f"{seconds:.1f} s, {plan.regrasps} regrasps")]
+
+
+def path_facts(plan: MovePlan) -> list[tuple[str, str]]:
+    """What was proved of the arm's path."""
+    certificate = plan.certificate
+    proof = "proved collision-free between all samples" if certificate.proved else f"not proved: {certificate.reason}"
     return [
-        ("Steps", " → ".join(step.kind for step in plan.steps)),
-        ("Duration", f"{seconds:.1f} s, {plan.regrasps} regrasps"),
-        ("Path", f"{proof}, margin {html.millimetres(certificate.margin, 1)}"),
+        ("Path", proof),
+        ("Margin", f"{html.millimetres(certificate.margin, 1)} to everything that may not touch"),
         ("Closest", f"{html.millimetres(certificate.least_clearance, 1)} between {' and '.join(certificate.bodies) or 'nothing'}"),
+        ("Exact checks", f"{certificate.checks}"),
     ]
 
 

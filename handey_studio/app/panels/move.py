@@ -8,7 +8,7 @@ import viser
 from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove, StartMove
 from handey_studio.app.commands import POSE_LABEL, ChoosePart, FreePose, Redo, ResetCell, SetDestination, SetSeed, Undo
-from handey_studio.app.guidance import next_step
+from handey_studio.app.guidance import next_step, stages
 from handey_studio.app.scene.destination import ghost_pose
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
@@ -60,7 +60,8 @@ class MovePanel:
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
             return
-        set_to(self._next, content=html.card(*next_step(new), testid="next-step"))
+        row = html.stage_chips(stages(new.job)) if new.job else ""
+        set_to(self._next, content=html.card(*next_step(new), testid="next-step") + row)
         self._show_command(new)
         self._show_job(new)
         undo, redo = new.undo[-1:], new.redo[-1:]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import viser
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -81,8 +82,10 @@ def ghost_pose(state: State) -> NDArray | None:
 
 def _arrived(state: State) -> bool:
     """Whether the part stands at its destination at the time that is looked at, so that a ghost there would only blur it."""
-    replay = state.replay
-    return replay is not None and replay.let_go(state.session.view.time_s) and replay.plan.T_world_part_goal is ghost_pose(state)
+    replay, pose = state.replay, ghost_pose(state)
+    if replay is None or pose is None or not replay.let_go(state.session.view.time_s):
+        return False
+    return bool(np.allclose(replay.plan.T_world_part_goal, pose, atol=1e-6))
 
 
 def _pose_of(gizmo: Any) -> NDArray:

@@ -24,6 +24,8 @@ class PlanScene:
         self._path: viser.SceneNodeHandle | None = None
 
     def render(self, old: State | None, new: State) -> None:
+        if old is not None and _looks(old) == _looks(new):
+            return
         if old is None or old.session.result is not new.session.result:
             self._build(new)
         self._show(new)
@@ -38,9 +40,13 @@ class PlanScene:
         scene.add_frame("/plan", show_axes=False)
         points, colours = coloured_path(replay)
         self._path = scene.add_line_segments(PATH, scaled(points), colors=colours, thickness=3.0, thickness_units="screen")
-        self._grasp = add_grasp(scene, replay.plan.grasp, replay.plan.T_world_part_start)
+        self._grasp = add_grasp(scene, replay.plan.grasp)
 
     def _show(self, state: State) -> None:
+        """The grasp stays on the part wherever the timeline has it."""
+        replay = state.replay
+        if self._grasp is not None and replay is not None:
+            place(self._grasp, replay.at(state.session.view.time_s).T_world_part)
         hidden = state.session.view.hidden_layers
         for handle, layer in ((self._path, "hand path"), (self._grasp, "grasp")):
             if handle is not None and handle.visible != (layer not in hidden):
@@ -56,13 +62,16 @@ def coloured_path(replay: Replay) -> tuple[NDArray, NDArray]:
     return np.stack([points[:-1], points[1:]], axis=1), np.repeat(colours[:, None], 2, axis=1)
 
 
-def add_grasp(scene: viser.SceneApi, grasp: GraspChoice, T_world_part: NDArray) -> viser.FrameHandle:
-    """The outline where the fingers' faces face each other, and, thicker, the edge that is crossed first."""
+def add_grasp(scene: viser.SceneApi, grasp: GraspChoice) -> viser.FrameHandle:
+    """Below a frame of the part: the outline where the grasped faces face each other, and, thicker, the edge that is crossed first."""
     frame = scene.add_frame(GRASP, show_axes=False)
-    place(frame, T_world_part)
     if len(grasp.contact_part) > 1:
         loop = np.stack([grasp.contact_part, np.roll(grasp.contact_part, -1, axis=0)], axis=1)
         scene.add_line_segments(f"{GRASP}/contact", scaled(loop), colors=palette.TEAL, thickness=3.0, thickness_units="screen")
     edge = scaled(grasp.edge_part)[None]
     scene.add_line_segments(f"{GRASP}/first_edge", edge, colors=palette.VERMILLION, thickness=6.0, thickness_units="screen")
     return frame
+
+
+def _looks(state: State) -> tuple:
+    return id(state.session.result), state.session.view.time_s, state.session.view.hidden_layers
