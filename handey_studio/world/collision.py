@@ -202,7 +202,7 @@ class CollisionModel:
         if most <= ALLOWED_DEPTH_M:  # so little that the exact depth would change nothing
             return most
         if hit.kind == 1:
-            return penetration(bodies.fcl_object(hit.body, placing), fcl_box(corners), most)
+            return column_depth(mine, bodies.fcl_object(hit.body, placing), corners)
         if hit.other not in self._fixed:
             self._fixed[hit.other] = fcl_convex(corners)
         return penetration(bodies.fcl_object(hit.body, placing), fcl.CollisionObject(self._fixed[hit.other]), most)
@@ -232,6 +232,16 @@ def least_side(one: NDArray, other: NDArray) -> float:
     low, high = np.maximum(one.min(axis=0), other.min(axis=0)), np.minimum(one.max(axis=0), other.max(axis=0))
     along = np.minimum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0))
     return float(max(along.min(), 0.0)) if (high >= low).all() else 0.0
+
+
+def column_depth(body: NDArray, one: fcl.CollisionObject, column: NDArray) -> float:
+    """Depth [m] that a body stands in a column of the depth map: upwards out of it, or sideways less the column's own width.
+
+    Where in its cell a column's edge lies the map does not tell, so a body beside it may reach a cell into it.
+    """
+    lift = float(column[:, 2].max() - body[:, 2].min())
+    width = float(np.linalg.norm(column[4] - column[0]))
+    return max(0.0, min(lift, penetration(one, fcl_box(column)) - width))
 
 
 def fcl_box(corners: NDArray) -> fcl.CollisionObject:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import apply
-from handey_studio.world.collision import fcl_box, fcl_convex, least_side, penetration
+from handey_studio.world.collision import column_depth, fcl_convex, least_side, penetration
 from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, columns_of, solids_of
 from handey_studio.world.gjk import distance
 from handey_studio.world.part import PlacedPart
@@ -60,5 +60,6 @@ def _gap(name: str, piece: NDArray, mine: fcl.CollisionObject, corners: NDArray)
     apart = distance(piece, 0, len(piece), np.ascontiguousarray(corners), 0, len(corners), 1e-9)
     if apart > 0:
         return float(apart)
-    theirs = fcl_box(corners) if name == DEPTH_MAP else fcl.CollisionObject(fcl_convex(corners))
-    return -penetration(mine, theirs, least_side(piece, corners))
+    if name == DEPTH_MAP:
+        return -column_depth(piece, mine, corners)
+    return -penetration(mine, fcl.CollisionObject(fcl_convex(corners)), least_side(piece, corners))
