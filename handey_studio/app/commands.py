@@ -14,9 +14,10 @@ from handey_studio.session import Session
 from handey_studio.session.destination import check_command, destination_pose, destinations_on_parts, snapped
 from handey_studio.session.looking import edge_at
 from handey_studio.task.destination import format_pose
-from handey_studio.task.plan import MoveCommand
+from handey_studio.task.plan import MoveCommand, MoveResult
 
 POSE_LABEL = "a pose on the table"
+CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
 FREE_TABLE = "0.35,-0.35,0,0,0,0"  # beside the scan area, in every robot's reach
 
 
@@ -274,7 +275,7 @@ class JobProgress:
     def apply(self, state: State) -> State:
         if state.job is None or state.job.number != self.number:
             return state
-        return replace(state, job=replace(state.job, fraction=self.fraction, message=self.message))
+        return replace(state, job=replace(state.job, fraction=max(state.job.fraction, self.fraction), message=self.message))
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,7 +307,7 @@ class JobDone:
         result = session.result
         if result is None:
             return state
-        kind = "bad" if result.status == "failed" else "good"
+        kind = "good" if result.status != "failed" else "info" if result.reason == CANCELLED else "bad"
         return replace(state, playing=state.replay is not None).told(outcome(result), kind)
 
 
@@ -341,13 +342,16 @@ def merged(shown: Session, found: Session) -> Session:
     return replace(shown, scene=found.scene, results=found.results, cell_now=found.cell_now)
 
 
-def outcome(result) -> str:
+def outcome(result: MoveResult) -> str:
     """One sentence about a result."""
     what = f"MOVE {result.command.part} TO {result.command.to}"
+    if result.reason == CANCELLED:
+        return f"{what} was cancelled."
     if result.status == "failed":
         return f"{what} failed: {result.reason}"
-    seconds = sum(float(step.time_s[-1]) for step in result.plan.steps)
-    return f"{what} is {'done' if result.status == 'done' else 'planned'}: {len(result.plan.steps)} steps, {seconds:.1f} s."
+    steps = result.plan.steps if result.plan else ()
+    seconds = sum(float(step.time_s[-1]) for step in steps)
+    return f"{what} is {'done' if result.status == 'done' else 'planned'}: {len(steps)} steps, {seconds:.1f} s."
 
 
 def _with_command(state: State, label: str, command: MoveCommand) -> State:

@@ -1,5 +1,6 @@
 """What to do next, said in one sentence for every state that the workbench can be in."""
 
+from handey_studio.app.commands import CANCELLED
 from handey_studio.app.state import Job, State
 from handey_studio.session.run import PLANNED, SENSED
 
@@ -31,6 +32,8 @@ def next_step(state: State) -> tuple[str, str, str]:
         return "Ready to MOVE", "Check the destination, then press Plan to look before anything moves, or MOVE to do it.", "info"
     if result.command != state.command:
         return "The command has changed", "What is shown belongs to the MOVE before. Press Plan or MOVE for the new one.", "info"
+    if result.reason == CANCELLED:
+        return "Cancelled", "What was found so far is shown. Press Plan or MOVE to start again.", "quiet"
     if result.status == "failed":
         return "No plan was found", f"{result.reason} The ledger tells what was tried; another destination may do.", "bad"
     if result.status == "planned":

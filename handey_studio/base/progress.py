@@ -1,5 +1,6 @@
 """Progress and cancel: the one call inside long loops."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 
@@ -21,3 +22,19 @@ class Silent:
 
     def report(self, fraction: float, message: str) -> None:
         pass
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of a longer piece of work, as the progress of its own."""
+
+    whole: Progress
+    low: float
+    high: float
+
+    def report(self, fraction: float, message: str) -> None:
+        self.whole.report(self.low + fraction * (self.high - self.low), message)
+
+    @property
+    def cancelled(self) -> bool:
+        return self.whole.cancelled

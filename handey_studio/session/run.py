@@ -3,13 +3,12 @@
 from dataclasses import replace
 from typing import Protocol
 
-from handey_studio.base import BadInput, Progress
+from handey_studio.base import BadInput, Progress, Share
 from handey_studio.cell.protocol import CannotAct
 from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.cell.workcell import SimulatedSetup
 from handey_studio.session.session import Session
 from handey_studio.task import MoveOptions, MoveResult, Station, check_command, execute_in, plan_in, sense
-from handey_studio.task.run import Share
 from handey_studio.world import Library
 
 SENSED, PLANNED = 0.25, 0.9  # how much of a whole MOVE's progress is behind when it is sensed, and when it is planned
@@ -24,13 +23,31 @@ class ShowingProgress(Progress, Protocol):
 def run_session(session: Session, library: Library, execute: bool, progress: ShowingProgress) -> Session:
     """Sense, plan and, if asked, execute the session's last MOVE in its cell; the session with all that was found.
 
-    Nothing found is a result in the session, not an exception. Raises BadInput for a command that means nothing here.
+    A plan that was made for this MOVE and looked at is carried out as it is. Nothing found is a result in the session, not an
+    exception. Raises BadInput for a command that means nothing here.
     """
     if not session.commands:
         raise BadInput(f'session "{session.name}" has no MOVE; choose a part and a destination.')
     command, station = session.commands[-1], station_of(session, library)
     check_command(command, station.models)
     cell = cell_of(session, library)
+    if not (execute and is_planned(session)):
+        session = _sensed_and_planned(session, station, cell, progress)
+        if execute and is_planned(session):
+            progress.show(session)
+    if not execute or not is_planned(session) or progress.cancelled:
+        return session
+    return _executed(session, station, cell, progress)
+
+
+def is_planned(session: Session) -> bool:
+    """Whether what the session shows is a plan for its last MOVE that was not carried out yet."""
+    result = session.results[-1] if session.results else None
+    return session.scene is not None and result is not None and result.status == "planned" and result.command == session.commands[-1]
+
+
+def _sensed_and_planned(session: Session, station: Station, cell: SimulatedCell, progress: ShowingProgress) -> Session:
+    command = session.commands[-1]
     try:
         scene = sense(station, cell, session.seed, Share(progress, 0.0, SENSED))
     except CannotAct as error:
@@ -39,12 +56,14 @@ def run_session(session: Session, library: Library, execute: bool, progress: Sho
     progress.show(session)
     options = MoveOptions(seed=session.seed)
     result = plan_in(station, scene, command, cell.joints(), cell.opening(), options, Share(progress, SENSED, PLANNED))
-    session = replace(session, results=(result,))
-    if not execute or result.plan is None or progress.cancelled:
+    return replace(session, results=(result,))
+
+
+def _executed(session: Session, station: Station, cell: SimulatedCell, progress: ShowingProgress) -> Session:
+    if session.scene is None:
         return session
-    progress.show(session)
-    result = execute_in(station, scene, result, cell, Share(progress, PLANNED, 1.0))
-    return replace(session, results=(result,), cell_now=setup_of(session, cell))
+    result = execute_in(station, session.scene, session.results[-1], cell, Share(progress, PLANNED, 1.0))
+    return replace(session, results=(result,), cell_now=setup_of(session, cell, fall=result.status != "done"))
 
 
 def station_of(session: Session, library: Library) -> Station:
@@ -58,8 +77,11 @@ def cell_of(session: Session, library: Library) -> SimulatedCell:
     return SimulatedCell(workcell if session.cell_now is None else replace(workcell, setup=session.cell_now), library)
 
 
-def setup_of(session: Session, cell: SimulatedCell) -> SimulatedSetup:
-    """Where the cell's bodies stand now. It is kept so that the next MOVE finds the cell as it was left; no planner reads it."""
+def setup_of(session: Session, cell: SimulatedCell, fall: bool) -> SimulatedSetup:
+    """Where the cell's bodies stand now. It is kept so that the next MOVE finds the cell as it was left; no planner reads it.
+
+    With `fall`, what an execution that ended early still held falls until it rests.
+    """
     before = session.cell_now or session.workcell.setup
     bodies = tuple(replace(body, T_world_body=cell.true_pose(body.name)) for body in before.bodies)
-    return SimulatedSetup(bodies, drop=False, seed=before.seed)
+    return SimulatedSetup(bodies, drop=fall, seed=before.seed)

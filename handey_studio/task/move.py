@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handey_studio.base import Entry, Ledger, Progress, Silent, describe
+from handey_studio.base import Entry, Ledger, Progress, Share, Silent, describe
 from handey_studio.base.errors import unknown_name
 from handey_studio.task.destination import base_name, goal_poses, parse_destination
 from handey_studio.task.grasp_search import grasps_of
@@ -55,13 +55,14 @@ def plan_move(
             if progress.cancelled:
                 reason = "cancelled"
                 break
-            progress.report(count / min(len(tries), options.max_groups), f"grasp group {count + 1} of {len(tries)}: {option.group.name}")
+            part = Share(progress, count / min(len(tries), options.max_groups), (count + 1) / min(len(tries), options.max_groups))
+            part.report(0.0, f"grasp group {count + 1} of {len(tries)}: {option.group.name}")
             entry = ledger.add("grasp group", option.name, parent=option.goal.entry)
             with _timed(timing, "grasp"):
                 grasps = grasps_of(option, entry, ledger)
             for grasp in grasps:
                 with _timed(timing, "motion"):
-                    plan = plan or complete(grasp, start, ledger, progress, rng)
+                    plan = plan or complete(grasp, start, ledger, part, rng)
             if plan is not None:
                 break
             if grasps:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.base import BadInput, Ledger, Progress, Silent, Value, frozen_array
+from handey_studio.base import BadInput, Ledger, Progress, Share, Silent, Value, frozen_array
 from handey_studio.cell.protocol import CannotAct, Cell
 from handey_studio.cell.workcell import Workcell
 from handey_studio.task.execute import execute
@@ -28,22 +28,6 @@ class Station(Value):
     @property
     def models(self) -> dict[str, Part]:
         return {part.name: part for part in self.parts}
-
-
-@dataclass(frozen=True)
-class Share:
-    """A share of a longer piece of work, as the progress of its own."""
-
-    whole: Progress
-    low: float
-    high: float
-
-    def report(self, fraction: float, message: str) -> None:
-        self.whole.report(self.low + fraction * (self.high - self.low), message)
-
-    @property
-    def cancelled(self) -> bool:
-        return self.whole.cancelled
 
 
 def sense(station: Station, cell: Cell, seed: int = 0, progress: Progress = Silent()) -> Scene:

@@ -10,11 +10,12 @@ from handey_studio.app import html
 from handey_studio.app.cspace import nearest, slice_svg
 from handey_studio.app.palette import elevation_colours
 from handey_studio.app.panels.findings import grasp_facts, result_html
-from handey_studio.app.panels.ledger import ledger_html
+from handey_studio.app.panels.ledger import context, ledger_html
 from handey_studio.app.panels.sensing import edge_labels, found_html, hypothesis_labels, number_of, picked
 from handey_studio.app.panels.timeline import strip
 from handey_studio.app.scene.depth import elevation_span, stride_of, thinned
 from handey_studio.app.svg import grasp_plane_svg
+from handey_studio.base import Ledger
 from handey_studio.motion import CSpaceSummary
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session import Replay
@@ -67,7 +68,7 @@ def test_words_of_others_are_escaped_everywhere(session):
     result = replace(session.results[0], reason=evil, status="failed", plan=None, timing_s={evil: 1.0})
     scene = replace(session.scene, instances=tuple(replace(placed, name=evil) for placed in session.located))
     located = replace(scene.located, reason=evil)
-    shown = [ledger_html(entries, 9), result_html(result), found_html(replace(session, scene=replace(scene, located=located)))]
+    shown = [ledger_html(entries, entries), result_html(result), found_html(replace(session, scene=replace(scene, located=located)))]
     shown += [html.card(evil, evil, testid=evil), html.facts([(evil, evil)]), html.empty(evil), html.swatch((0, 0, 0), evil)]
     assert all("<script" not in text for text in shown)
 
@@ -78,10 +79,25 @@ def test_the_timeline_strip_names_the_step_at_its_time(session, robot):
     assert "left:50.000%" in strip(replay, 5.0, True, 1.0)
 
 
+def test_the_ledger_groups_by_stage_and_says_what_an_entry_belongs_to():
+    book = Ledger()
+    goal = book.add("destination", "here")
+    first, second = book.add("grasp group", "edge 1", "too narrow", parent=goal), book.add("grasp group", "edge 2", parent=goal)
+    hand = book.add("approach", "hand at 5°", parent=second)
+    book.add("reach", "branch 3", "the arm collides", parent=hand, value=-0.013, limit=0.001, unit="m", bodies=("a", "b"))
+    known = {entry.id: entry for entry in book.entries}
+    assert context(book.entries[4], known) == "edge 2 › hand at 5°"
+    assert context(book.entries[first], known) == "" == context(book.entries[goal], known)
+    text = ledger_html(book.entries, book.entries)
+    assert "2 tried, 1 fell" in text and "the arm collides: -13 mm, limit 1 mm (a – b)" in text
+    assert text.index("Destination") < text.index("Grasp group") < text.index("Approach") < text.index("Reach")
+
+
 def test_numbers_are_read_in_millimetres_and_degrees():
     assert html.number(0.00125, "m") == "1.25 mm"
+    assert html.number(-0.000003736, "m") == "0 mm"
     assert html.number(np.pi / 2, "rad") == "90 °"
-    assert html.number(3.0, "deg") == "3 deg"
+    assert html.number(3.0, "deg") == "3 °"
     assert html.number(2.5, "") == "2.5"
 
 

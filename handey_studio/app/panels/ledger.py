@@ -14,7 +14,7 @@ from handey_studio.base import Entry, rejected_counts
 
 ALL_STAGES = "all stages"
 ONLY = ("all", "fell", "stood")
-MAX_ROWS = 250
+MAX_ROWS, MAX_REASONS, MAX_DEPTH = 80, 8, 12
 
 
 class LedgerPanel:
@@ -39,7 +39,7 @@ class LedgerPanel:
             self._stage.options = stages
         set_to(self._stage, value=new.ledger_stage if new.ledger_stage in stages else ALL_STAGES)
         picked = chosen(entries, new.ledger_stage if new.ledger_stage in stages else "", new.ledger_only, new.ledger_words)
-        self._list.content = ledger_html(picked, len(entries)) if entries else html.empty(NOTHING, "ledger-empty")
+        self._list.content = ledger_html(picked, entries) if entries else html.empty(NOTHING, "ledger-empty")
 
 
 NOTHING = "Nothing was tried yet. After Plan or MOVE this lists every candidate and why it fell."
@@ -57,16 +57,15 @@ def chosen(entries: Sequence[Entry], stage: str, only: str, words: str) -> list[
     ]
 
 
-def ledger_html(entries: Sequence[Entry], total: int) -> str:
-    """Reasons by count, then rows grouped by stage."""
+def ledger_html(entries: Sequence[Entry], whole: Sequence[Entry]) -> str:
+    """Reasons by count, then rows grouped by stage. `whole` is the unfiltered ledger, which knows the entries' parents."""
     counts = list(rejected_counts(entries).items())
     most = max((count for _, count in counts), default=1)
-    bars = "".join(_count_row(reason, count, most) for reason, count in counts[:8])
-    more = f" Showing the first {MAX_ROWS}; narrow it down above." if len(entries) > MAX_ROWS else ""
-    head = f'<div style="color:#6b7684;margin:6px 0">{len(entries)} of {total} entries.{more}</div>'
+    bars = "".join(_count_row(reason, count, most) for reason, count in counts[:MAX_REASONS])
+    head = f'<div style="color:#6b7684;margin:6px 0">{len(entries)} of {len(whole)} entries.</div>'
     return (
         f'<div data-testid="ledger" style="margin:4px 14px;font-size:12px;line-height:1.4">{bars}{head}'
-        f'<div style="max-height:380px;overflow:auto">{_rows(entries[:MAX_ROWS])}</div></div>'
+        f'<div style="max-height:420px;overflow:auto">{_groups(entries, {entry.id: entry for entry in whole})}</div></div>'
     )
 
 
@@ -82,23 +81,41 @@ def _count_row(reason: str, count: int, most: int) -> str:
     )
 
 
-def _rows(entries: Sequence[Entry]) -> str:
-    rows, stage = [], None
+def _groups(entries: Sequence[Entry], known: dict[int, Entry]) -> str:
+    """One heading a stage, in the order in which stages first ran, with its entries below."""
+    stages: dict[str, list[Entry]] = {}
     for entry in entries:
-        if entry.stage != stage:
-            stage = entry.stage
-            rows.append(f'<div style="font-weight:650;margin:8px 0 2px;text-transform:capitalize">{html.esc(stage)}</div>')
-        rows.append(_row(entry))
-    return "".join(rows)
+        stages.setdefault(entry.stage, []).append(entry)
+    groups = []
+    for stage, members in stages.items():
+        fell = sum(entry.reason is not None for entry in members)
+        name = stage[:1].upper() + stage[1:]
+        heading = f'{html.esc(name)} <span style="font-weight:400;color:#6b7684">{len(members)} tried, {fell} fell</span>'
+        more = len(members) - MAX_ROWS
+        rest = f'<div style="color:#6b7684">and {more} more; narrow it down above</div>' if more > 0 else ""
+        rows = "".join(_row(entry, known) for entry in members[:MAX_ROWS])
+        groups.append(f'<div style="font-weight:650;margin:8px 0 2px">{heading}</div>{rows}{rest}')
+    return "".join(groups)
 
 
-def _row(entry: Entry) -> str:
-    """A dot that says whether it fell, the option, and below it the reason with value and limit."""
+def _row(entry: Entry, known: dict[int, Entry]) -> str:
+    """A mark that says whether it fell, the option and what it belongs to, and below it the reason with value and limit."""
     fell = entry.reason is not None
-    mark = f'<span style="color:{css(palette.VERMILLION)}">✕</span>' if fell else f'<span style="color:{css(palette.TEAL)}">●</span>'
-    why = f'<div style="color:#6b7684;padding-left:18px">{html.esc(_reason(entry))}</div>' if fell else ""
-    option = f'<span style="display:inline-block;width:18px">{mark}</span>{html.esc(entry.option)}'
-    return f'<div style="padding:2px 0;border-bottom:1px solid #eef1f4">{option}{why}</div>'
+    colour, sign = (palette.VERMILLION, "✕") if fell else (palette.TEAL, "●")
+    mark = f'<span style="color:{css(colour)};display:inline-block;width:18px">{sign}</span>'
+    owner = html.esc(context(entry, known))
+    below = [f'<div style="color:#97a1ad;padding-left:18px">{owner}</div>'] if owner else []
+    below += [f'<div style="color:#6b7684;padding-left:18px">{html.esc(_reason(entry))}</div>'] if fell else []
+    return f'<div style="padding:2px 0;border-bottom:1px solid #eef1f4">{mark}{html.esc(entry.option)}{"".join(below)}</div>'
+
+
+def context(entry: Entry, known: dict[int, Entry]) -> str:
+    """What an entry belongs to: the options above it, outermost first, without the outermost of all, which is always the same."""
+    names: list[str] = []
+    while entry.parent is not None and entry.parent in known and len(names) < MAX_DEPTH:
+        entry = known[entry.parent]
+        names.append(entry.option)
+    return " › ".join(names[-2::-1])
 
 
 def _reason(entry: Entry) -> str:
