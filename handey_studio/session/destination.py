@@ -11,7 +11,7 @@ from handey_studio.task.plan import MoveCommand
 from handey_studio.world import Part, PlacedPart
 
 SNAP_M, SNAP_RAD = 0.001, np.deg2rad(1.0)
-UPRIGHT_RAD = np.deg2rad(5.0)  # turned by hand this close to a quarter turn means the quarter turn
+UPRIGHT_RAD = np.deg2rad(4.5)  # turned by hand this close to a quarter turn means the quarter turn; between whole degrees
 DROP_M = 0.012  # let go this close to the table, or below it, means standing on it
 
 
