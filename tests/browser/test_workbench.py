@@ -4,6 +4,7 @@ import time
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from handey_studio.session import own_file, read_session, session_to_bytes
 from tests.browser.conftest import ARTEFACTS, LARGE
@@ -220,3 +221,35 @@ def link_positions(workbench) -> np.ndarray:
     """Where the browser's robot has its links."""
     handles = workbench.server.scene._handle_from_node_name
     return np.array([handles[f"/robot/link{i}"].position for i in range(7)])
+
+
+def test_the_ghost_is_dragged_snaps_and_is_one_undo_step(studio, visit, tmp_path):
+    workbench = studio(fresh_session(tmp_path))
+    page = visit(workbench, viewport=LARGE)
+    before = destination(workbench)
+    along = np.array([0.0, 1.0, 0.0])  # the part is turned by 90°, so its x arrow points along the world's y
+    tip = 10.0 * np.array(before[:3]) + along
+    x, y = pixel_of(page, workbench, tip)
+    page.mouse.move(x, y)
+    time.sleep(0.5)
+    page.mouse.down()
+    ahead = pixel_of(page, workbench, tip + 0.6 * along)
+    page.mouse.move(*ahead, steps=15)
+    time.sleep(0.3)
+    page.mouse.up()
+    wait_until(lambda: workbench.state.undo)
+    after = destination(workbench)
+    assert abs(after[1] - before[1]) > 0.01
+    assert all(abs(1e3 * number - round(1e3 * number)) < 1e-6 for number in after[:2])
+    press(page, "Undo: drag destination")
+    wait_until(lambda: destination(workbench) == before)
+
+
+def pixel_of(page, workbench, point: np.ndarray) -> tuple[float, float]:
+    """Where a point of the scene is on the page, by the browser's own camera."""
+    camera = next(iter(workbench.server.get_clients().values())).camera
+    rotation = Rotation.from_quat(camera.wxyz, scalar_first=True)
+    x, y, z = rotation.inv().apply(point - camera.position)
+    box = page.locator("canvas").first.bounding_box()
+    focal = box["height"] / 2 / np.tan(camera.fov / 2)
+    return box["x"] + box["width"] / 2 + focal * x / z, box["y"] + box["height"] / 2 + focal * y / z
