@@ -79,10 +79,13 @@ class PipeProgress:
 
 
 class Planner:
-    """One planner process. `heard` is called from a thread of its own with each message that comes back."""
+    """One planner process. `heard` is called from a thread of its own with each message that comes back.
 
-    def __init__(self, run: Run, heard: Callable[[Any], None]) -> None:
-        self._run, self._heard = run, heard
+    `prepare` runs in the process before its first job, so that what is compiled on first use is compiled while the user looks.
+    """
+
+    def __init__(self, run: Run, heard: Callable[[Any], None], prepare: Callable[[], None] | None = None) -> None:
+        self._run, self._heard, self._prepare = run, heard, prepare
         self._context = mp.get_context("spawn")
         self._lock = threading.Lock()
         self._number = 0
@@ -92,7 +95,8 @@ class Planner:
     def _start(self) -> None:
         self._pipe, theirs = self._context.Pipe()
         self._cancel = self._context.Event()
-        self._process = self._context.Process(target=_serve, args=(theirs, self._cancel, self._run), name="handey-planner", daemon=True)
+        given = (theirs, self._cancel, self._run, self._prepare)
+        self._process = self._context.Process(target=_serve, args=given, name="handey-planner", daemon=True)
         self._process.start()
         theirs.close()
         threading.Thread(target=self._listen, args=(self._pipe, self._process), name="planner-listener", daemon=True).start()
@@ -138,8 +142,10 @@ class Planner:
             self._heard(Failed(self._number, sentence, True))
 
 
-def _serve(pipe: Connection, cancel: Any, run: Run) -> None:
+def _serve(pipe: Connection, cancel: Any, run: Run, prepare: Callable[[], None] | None) -> None:
     """The planner process: one job after the other until the pipe closes."""
+    if prepare is not None:
+        prepare()
     while True:
         try:
             order = pipe.recv()

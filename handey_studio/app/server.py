@@ -5,6 +5,7 @@ import os
 import socket
 import threading
 import webbrowser
+from functools import partial
 from pathlib import Path
 
 import viser
@@ -13,6 +14,7 @@ from handey_studio.app.planner import Run
 from handey_studio.app.wire import close_share_tunnel
 from handey_studio.app.workbench import Workbench
 from handey_studio.base import BadInput
+from handey_studio.motion import warm_up
 from handey_studio.session import Session, find_session, read_session
 from handey_studio.session.run import run_session
 from handey_studio.world import Library
@@ -36,14 +38,15 @@ def start(
     if not isinstance(session, Session):
         path = find_session(library, session)
         session = read_session(path)
-    library.robot(session.workcell.robot)
+    robot = library.robot(session.workcell.robot)
     check_port(host, port)
     server = viser.ViserServer(host=host, port=port, label="Handey Studio", verbose=False)
     if server.get_port() != port:
         server.stop()
         raise _port_taken(host, port)
     close_share_tunnel(server)
-    workbench = Workbench(server, library, session, path, run)
+    prepare = partial(warm_up, robot) if run is run_session else None
+    workbench = Workbench(server, library, session, path, run, prepare)
     workbench.start()
     return workbench
 

@@ -41,7 +41,7 @@ class Job:
     number: int
     execute: bool
     fraction: float = 0.0
-    message: str = "Starting the planner …"
+    message: str = "Starting the planner; the first time on a machine it compiles for half a minute."
     cancelling: bool = False
 
 

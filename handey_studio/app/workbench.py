@@ -4,6 +4,7 @@ import logging
 import queue
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,14 +34,16 @@ NOTICE_LOOKS = {"info": ("Handey Studio", BLUE), "good": ("Done", TEAL), "bad": 
 class Workbench:
     """Server, planner and state of one running workbench. `start` returns at once; `stop` ends it."""
 
-    def __init__(self, server: viser.ViserServer, library: Library, session: Session, path: Path | None, run: Run) -> None:
+    def __init__(
+        self, server: viser.ViserServer, library: Library, session: Session, path: Path | None, run: Run, prepare: Callable[[], None] | None
+    ) -> None:
         self.server = server
         self.state: State = opened(library, session, path)
         self._commands: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._camera: CameraMoved | None = None
         self._running = threading.Event()
         self._running.set()
-        self.planner = Planner(run, lambda message: self.send(heard(message)))
+        self.planner = Planner(run, lambda message: self.send(heard(message)), prepare)
         self._view = View(server, self.send)
         self._start_from(session.view.camera_position, session.view.camera_look_at)
         self._view.render(None, self.state)
