@@ -15,7 +15,7 @@ from handey_studio.world.robot import Robot
 
 MAX_FILE_BYTES = 200_000_000
 MAX_SIDE = 4096
-KEYS = ("elevation", "cell", "T_world_range", "lights", "source", "noise", "outline_error")
+KEYS = ("elevation", "cell", "T_world_range", "passed", "noise", "outline_error")
 
 
 class RecordedCell:
@@ -78,14 +78,14 @@ def read_depth_map(path: str | os.PathLike) -> DepthMap:
 
 
 def _checked(path: Path, arrays: dict[str, NDArray]) -> DepthMap:
-    elevation, source = arrays["elevation"], arrays["source"]
-    if elevation.ndim != 2 or min(elevation.shape) < 2 or max(elevation.shape) > MAX_SIDE or source.shape != elevation.shape:
+    elevation, passed = arrays["elevation"], arrays["passed"]
+    if elevation.ndim != 2 or min(elevation.shape) < 2 or max(elevation.shape) > MAX_SIDE or passed.shape != elevation.shape:
         raise BadInput(f'the depth map "{path}" has the shape {elevation.shape}; it takes two sides of 2 to {MAX_SIDE} cells.')
     if not np.isfinite(elevation).any():
         raise BadInput(f'the depth map "{path}" holds no reading; every one of its {elevation.size} cells is empty.')
-    if not is_rigid(arrays["T_world_range"]) or arrays["lights"].ndim != 2 or arrays["lights"].shape[1] != 3:
-        raise BadInput(f'the depth map "{path}" needs a rigid T_world_range (4, 4) and lights (k, 3).')
+    if not is_rigid(arrays["T_world_range"]) or not np.isfinite(passed).all():
+        raise BadInput(f'the depth map "{path}" needs a rigid T_world_range (4, 4) and finite heights of the light that passed.')
     numbers = {key: float(arrays[key]) for key in ("cell", "noise", "outline_error")}
     if not all(np.isfinite(value) and value > 0 for value in numbers.values()):
         raise BadInput(f'the depth map "{path}" gives {numbers}; each must be a length above 0 m.')
-    return DepthMap(elevation, T_world_range=arrays["T_world_range"], lights=arrays["lights"], source=source, **numbers)
+    return DepthMap(elevation, T_world_range=arrays["T_world_range"], passed=passed, **numbers)

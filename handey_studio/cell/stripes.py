@@ -135,4 +135,5 @@ def photograph(finder: RangeFinder, bodies: Sequence[SolidBody], rng: np.random.
         peaks = stripe_peaks(finder, camera, surfaces)
         u = peaks.u + rng.normal(0.0, finder.peak_noise_px, len(peaks.u))
         readings.append(triangulate(finder, camera, u, peaks.v, peaks.plane))
-    return fuse(finder, np.concatenate(readings))
+    cameras = np.repeat(np.arange(len(readings)), [len(points) for points in readings])
+    return fuse(finder, np.concatenate(readings), cameras)

@@ -9,6 +9,7 @@ from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.transforms import transform
 from handey_studio.sensing.depth_view import DepthView, Orthographic
 
+SKY_M = 10.0  # higher than anything that a map holds
 VIEW_HEIGHT_M = 1.0  # the orthographic view's origin sits this far above the range frame; any height above the pile serves
 
 
@@ -16,23 +17,21 @@ VIEW_HEIGHT_M = 1.0  # the orthographic view's origin sits this far above the ra
 class DepthMap(Value):
     """Elevations (ny, nx) [m] above z = 0 of the range frame, NaN where nothing was read; the highest surface wins.
 
-    Cell (j, i) covers x in [i, i + 1)·cell and y in [j, j + 1)·cell of the range frame. `lights` (k, 3) [m], in the range
-    frame, are the positions of the light sources: every reading was lit by one of them, so the space between is empty.
-    `source` (ny, nx) uint8 tells which one lit each cell. `noise` and `outline_error` [m] as in `DepthView`.
+    Cell (j, i) covers x in [i, i + 1)·cell and y in [j, j + 1)·cell of the range frame. `passed` (ny, nx) [m] is the lowest height
+    above each cell that light on its way to a reading, or from it to a camera, went through: the space above it is empty. It is the
+    elevation itself where there is one, and `SKY_M` where no such light passed. `noise` and `outline_error` [m] as in `DepthView`.
     """
 
     elevation: NDArray
     cell: float
     T_world_range: NDArray
-    lights: NDArray
-    source: NDArray
+    passed: NDArray
     noise: float = 0.0005
     outline_error: float = 0.001
 
     def __post_init__(self) -> None:
-        for key in ("elevation", "T_world_range", "lights"):
+        for key in ("elevation", "T_world_range", "passed"):
             object.__setattr__(self, key, frozen_array(getattr(self, key)))
-        object.__setattr__(self, "source", frozen_array(self.source, np.uint8))
 
     def view(self) -> DepthView:
         """The map as an image, seen from above by parallel light; row 0 is the far side, y = ny·cell."""

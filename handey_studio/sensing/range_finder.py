@@ -14,6 +14,7 @@ from handey_studio.base import BadInput, Value, frozen_array
 from handey_studio.geometry.transforms import is_rigid, transform
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.sensing.depth_view import Pinhole
+from handey_studio.sensing.light_paths import passing_heights
 
 AREA_M = 0.4
 SAME_SURFACE = 6.0  # readings of one cell within this many standard deviations of its highest are of one surface
@@ -119,13 +120,15 @@ def triangulate(finder: RangeFinder, camera: int, u: NDArray, v: NDArray, plane:
     return origin + rays * along[:, None]
 
 
-def fuse(finder: RangeFinder, points_range: NDArray) -> DepthMap:
+def fuse(finder: RangeFinder, points_range: NDArray, cameras: NDArray | None = None) -> DepthMap:
     """The depth map of readings (n, 3) [m]. In each cell the highest surface wins, as the mean of its readings.
 
+    `cameras` (n,) tells which camera saw each reading; without it only the laser's light counts as having passed.
     Cells without a reading stay NaN, but for pinholes: single cells between readings of one surface take their median.
     """
     ny, nx = finder.shape
-    points = points_range[np.isfinite(points_range).all(axis=1)]
+    finite = np.isfinite(points_range).all(axis=1)
+    points, seen_by = points_range[finite], np.zeros(0) if cameras is None else cameras[finite]
     i, j = (np.floor(points[:, k] / finder.cell).astype(int) for k in (0, 1))
     kept = (i >= 0) & (j >= 0) & (i < nx) & (j < ny) & (np.abs(points[:, 2]) <= finder.max_height)
     number, z = (j * nx + i)[kept], points[kept, 2]
@@ -136,15 +139,24 @@ def fuse(finder: RangeFinder, points_range: NDArray) -> DepthMap:
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.bincount(number[top], weights=z[top], minlength=ny * nx) / count
     readings = max(1.0, float(np.median(count[count > 0]))) if kept.any() else 1.0
+    elevation = _without_pinholes(_without_specks(mean.reshape(ny, nx), SPECK_SLOPE * finder.cell), PINHOLE_SLOPE * finder.cell)
     return DepthMap(
-        elevation=_without_pinholes(_without_specks(mean.reshape(ny, nx), SPECK_SLOPE * finder.cell), PINHOLE_SLOPE * finder.cell),
+        elevation=elevation,
         cell=finder.cell,
         T_world_range=finder.T_world_range,
-        lights=finder.laser[None],
-        source=np.zeros((ny, nx), np.uint8),
+        passed=passing_heights(elevation, finder.cell, *_lines(finder, points[kept], None if cameras is None else seen_by[kept])),
         noise=finder.reading_noise / np.sqrt(readings),
         outline_error=finder.cell,
     )
+
+
+def _lines(finder: RangeFinder, points: NDArray, seen_by: NDArray | None) -> tuple[NDArray, NDArray]:
+    """Readings and the far ends of the empty lines from them: each to the laser, and to the camera that saw it."""
+    laser = np.broadcast_to(finder.laser, points.shape)
+    if seen_by is None:
+        return points, laser
+    eyes = np.array([camera.T_range_camera[:3, 3] for camera in finder.cameras])[seen_by]
+    return np.concatenate([points, points]), np.concatenate([laser, eyes])
 
 
 def _without_specks(elevation: NDArray, tolerance: float) -> NDArray:

@@ -1,7 +1,7 @@
 """What a depth map makes solid: space that no reading vouches for.
 
-Below a reading everything is solid. A hole, where nothing was read, is solid up to the lowest light that passed over it and
-was read beyond it (the shadow's own slope), and never above the hole's rim. Readings that a located part explains leave
+Below a reading everything is solid. A hole, where nothing was read, is solid up to the lowest light that passed over it on its
+way to a reading elsewhere (the shadow's own slope), and never above the hole's rim. Readings that a located part explains leave
 the map with it, and only those; what it stood on stays solid up to the part's underside.
 """
 
@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 
 from handey_studio.geometry import HeightField
 from handey_studio.geometry.transforms import apply, inverse
-from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.sensing.depth_map import SKY_M, DepthMap
 from handey_studio.world import Part, PlacedPart
 
 EXPLAINED_SIGMAS = 4.0  # a reading this many standard deviations from a part's surface is still the part's
@@ -25,11 +25,9 @@ EXPLAINED_SIGMAS = 4.0  # a reading this many standard deviations from a part's 
 def solid_columns(depth_map: DepthMap) -> HeightField:
     """The columns that are solid before any part is explained."""
     hole = np.isnan(depth_map.elevation)
-    top = np.where(hole, _rim(depth_map.elevation), depth_map.elevation)
-    vouched = np.full(hole.shape, np.inf)
-    for light in depth_map.lights:
-        vouched = np.minimum(vouched, _light_over_holes(np.array(depth_map.elevation), depth_map.cell, np.array(light)))
-    return HeightField(np.where(hole, np.minimum(top, vouched), top), depth_map.cell, depth_map.T_world_range)
+    unread = np.where(depth_map.passed < SKY_M, depth_map.passed, np.inf)
+    top = np.where(hole, np.minimum(_rim(depth_map.elevation), unread), depth_map.elevation)
+    return HeightField(top, depth_map.cell, depth_map.T_world_range)
 
 
 def without_parts(depth_map: DepthMap, columns: HeightField, placed: tuple[PlacedPart, ...]) -> HeightField:
@@ -53,32 +51,6 @@ def _rim(elevation: NDArray) -> NDArray:
     around = ndimage.maximum_filter(np.where(np.isnan(elevation), -np.inf, elevation), size=3)
     rims = np.atleast_1d(ndimage.maximum(around, labels, index=np.arange(1, count + 1))) if count else np.empty(0)
     return np.concatenate([[0.0], np.where(np.isfinite(rims), rims, np.inf)])[labels]
-
-
-@njit(cache=True)
-def _light_over_holes(elevation: NDArray, cell: float, light: NDArray) -> NDArray:
-    """Height [m] at which light passes over each hole cell on its way to the next reading beyond; infinity if there is none."""
-    ny, nx = elevation.shape
-    height = np.full((ny, nx), np.inf)
-    for j in range(ny):
-        for i in range(nx):
-            if not np.isnan(elevation[j, i]):
-                continue
-            x, y = (i + 0.5) * cell - light[0], (j + 0.5) * cell - light[1]
-            distance = max(np.hypot(x, y), 1e-9)
-            dx, dy = x / distance, y / distance
-            along = 0.5 * cell
-            while True:
-                ii = int(np.floor((x + dx * along + light[0]) / cell))
-                jj = int(np.floor((y + dy * along + light[1]) / cell))
-                if ii < 0 or jj < 0 or ii >= nx or jj >= ny:
-                    break
-                e = elevation[jj, ii]
-                if not np.isnan(e):
-                    height[j, i] = e + (light[2] - e) * along / (distance + along)
-                    break
-                along += 0.5 * cell
-    return height
 
 
 @lru_cache(maxsize=32)

@@ -103,10 +103,12 @@ def _check_solid(path: str, solid: Polyhedron) -> None:
 
 def _check_map(path: str, scan: DepthMap) -> None:
     shape = scan.elevation.shape
-    if len(shape) != 2 or not all(1 <= n <= MAX_MAP_SIDE for n in shape) or scan.source.shape != shape:
-        raise BadInput(f"{path} has {shape} cells and {scan.source.shape} sources; both must be one grid of up to {MAX_MAP_SIDE} a side.")
-    if not 0 < scan.cell <= MAX_CELL_M or scan.lights.ndim != 2 or scan.lights.shape[1:] != (3,):
-        raise BadInput(f"{path} needs cells of up to {MAX_CELL_M * 1e3:.0f} mm and lights of three coordinates.")
+    if len(shape) != 2 or not all(1 <= n <= MAX_MAP_SIDE for n in shape) or scan.passed.shape != shape:
+        raise BadInput(
+            f"{path} has {shape} cells and {scan.passed.shape} light heights; both must be one grid of up to {MAX_MAP_SIDE} a side."
+        )
+    if not 0 < scan.cell <= MAX_CELL_M or not np.isfinite(scan.passed).all():
+        raise BadInput(f"{path} needs cells of up to {MAX_CELL_M * 1e3:.0f} mm and finite light heights.")
     if np.isinf(scan.elevation).any() or not np.isfinite([scan.noise, scan.outline_error]).all():
         raise BadInput(f"{path} holds an infinite elevation or error.")
 

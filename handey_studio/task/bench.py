@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody
@@ -18,7 +19,7 @@ from handey_studio.task.move import MoveOptions
 from handey_studio.task.plan import MoveCommand, MovePlan
 from handey_studio.task.run import Station, run_move
 from handey_studio.task.sense import Scene
-from handey_studio.world import Library, Robot
+from handey_studio.world import Library, PlacedPart, Robot
 
 PARTS = ("l_block", "t_block", "wedge", "brick", "stairs", "bracket")
 STAGES = ("scan", "locate", "world", "destination", "options", "grasp", "motion", "execute")
@@ -78,12 +79,18 @@ def _violation(violation: Violation) -> str:
 
 def judge(scene: Scene, plan: MovePlan, bodies: tuple[SolidBody, ...], robot: Robot) -> list[str]:
     """What the independent check finds wrong with a plan against the true bodies as they stood before it."""
-    located = {placed.name: placed.T_world_part for placed in scene.instances}
+    located = {placed.name: _as_true(placed, bodies) for placed in scene.instances}
     try:
         report = check_plan(plan.steps, bodies, robot, names_in_plan(bodies, located))
     except BadInput as error:
         return [str(error)]  # what the plan takes for the part is none of the bodies
     return [_violation(violation) for violation in report.violations]
+
+
+def _as_true(placed: PlacedPart, bodies: tuple[SolidBody, ...]) -> NDArray:
+    """The instance's pose under the symmetry that brings it nearest to a true body: the poses look the same."""
+    poses = [placed.T_world_part @ S for S in placed.part.symmetries]
+    return min(poses, key=lambda T: min(sum(pose_difference(T, body.T_world_body)) for body in bodies if not body.fixed))
 
 
 def _off(pile: Pile, station: Station, cell: SimulatedCell) -> tuple[float, float]:

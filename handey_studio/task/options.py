@@ -90,7 +90,13 @@ def check_goal(world: World, instance: PlacedPart, label: str, T_world_goal: NDA
         height = placed.corners_world[:, 2].min() - world.table_z
         ledger.fall(entry, "nothing holds the part up at the destination", value=height, limit=MAX_GAP_M, unit="m")
         return None
-    at_start = tuple((instance.name, neighbour.name) for neighbour in neighbours(carried, instance))
+    beside = neighbours(carried, instance)
+    for neighbour in beside:
+        if neighbour.gap < -ALLOWED_DEPTH_M:
+            ledger.fall(entry, "something lies on the part where it is", value=-neighbour.gap, limit=ALLOWED_DEPTH_M, unit="m",
+                        bodies=(instance.name, neighbour.name))  # fmt: skip
+            return None
+    at_start = tuple((instance.name, neighbour.name) for neighbour in beside)
     at_goal = tuple((instance.name, neighbour.name) for neighbour in near if neighbour.gap <= TOUCHING_M)
     return Goal(instance, label, T_world_goal, entry, world, carried, carried.with_part(placed), at_start, at_goal)
 

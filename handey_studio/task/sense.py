@@ -42,7 +42,7 @@ def understand(
 
 
 def name_instances(poses: tuple[LocatedPose, ...], parts: tuple[Part, ...]) -> tuple[PlacedPart, ...]:
-    """`part#1`, `part#2`, … in the order of their scores."""
+    """`part#1`, `part#2`, … in the order in which they were found, best first."""
     models = {part.name: part for part in parts}
     counts = dict.fromkeys(models, 0)
     placed = []

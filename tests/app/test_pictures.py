@@ -122,7 +122,7 @@ def test_elevation_colours_grow_lighter_above_the_table():
 def test_a_large_scan_is_thinned_and_stays_in_place():
     elevation = np.full((700, 900), 0.01)
     elevation[100:200, 100:200] = np.nan
-    scan = DepthMap(elevation, 0.001, T_START, np.zeros((1, 3)), np.zeros(elevation.shape))
+    scan = DepthMap(elevation, 0.001, T_START, elevation)
     stride = stride_of(scan)
     points, heights = thinned(scan, np.ones(elevation.shape, dtype=bool), stride)
     assert 30_000 < len(points) <= 50_000 and (heights == 0.01).all()
@@ -133,8 +133,8 @@ def test_a_large_scan_is_thinned_and_stays_in_place():
 
 def test_an_empty_table_is_not_blown_up():
     scan = hand_made_scan()
-    assert elevation_span(replace(scan, elevation=np.full((5, 5), 0.0003), source=np.zeros((5, 5)))) == 0.02
-    assert elevation_span(replace(scan, elevation=np.full((5, 5), np.nan), source=np.zeros((5, 5)))) == 0.02
+    assert elevation_span(replace(scan, elevation=np.full((5, 5), 0.0003), passed=np.zeros((5, 5)))) == 0.02
+    assert elevation_span(replace(scan, elevation=np.full((5, 5), np.nan), passed=np.zeros((5, 5)))) == 0.02
 
 
 def test_readings_on_a_located_part_leave_the_map_with_it(session):

@@ -14,9 +14,8 @@ from handey_studio.sensing.depth_map import DepthMap
 def kept(tmp_path):
     elevation = np.random.default_rng(0).uniform(0, 0.1, (20, 30))
     elevation[3:5, 7:9] = np.nan
-    depth_map = DepthMap(
-        elevation, 0.002, transform(None, (0.4, -0.1, 0)), np.array([[0.03, 0.02, 1.2]]), np.zeros((20, 30), np.uint8), 3e-4, 2e-3
-    )
+    passed = np.nan_to_num(elevation, nan=0.04)
+    depth_map = DepthMap(elevation, 0.002, transform(None, (0.4, -0.1, 0)), passed, 3e-4, 2e-3)
     path = tmp_path / "scan.npz"
     write_depth_map(path, depth_map)
     return path, depth_map
@@ -46,9 +45,9 @@ def test_what_is_not_a_depth_map_is_refused_in_a_sentence(kept, tmp_path):
     np.savez(tmp_path / "lacks.npz", elevation=arrays["elevation"])
     np.savez(tmp_path / "empty.npz", **(arrays | {"elevation": np.full((20, 30), np.nan)}))
     np.savez(tmp_path / "bent.npz", **(arrays | {"T_world_range": np.zeros((4, 4))}))
-    np.savez(tmp_path / "flat.npz", **(arrays | {"elevation": np.zeros(30), "source": np.zeros(30, np.uint8)}))
+    np.savez(tmp_path / "flat.npz", **(arrays | {"elevation": np.zeros(30), "passed": np.zeros(30)}))
     np.savez(tmp_path / "zero.npz", **(arrays | {"cell": 0.0}))
-    np.savez(tmp_path / "pickle.npz", **(arrays | {"lights": np.array([{"a": 1}], dtype=object)}))
+    np.savez(tmp_path / "pickle.npz", **(arrays | {"passed": np.array([{"a": 1}], dtype=object)}))
     names = ("text", "cut", "lacks", "empty", "bent", "flat", "zero", "pickle", "missing")
     for name in names:
         with pytest.raises(BadInput) as told:

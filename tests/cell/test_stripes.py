@@ -77,10 +77,18 @@ def test_peaks_without_noise_lie_exactly_on_the_true_faces():
 
 def test_space_between_laser_and_readings_is_empty(depth_map):
     points = depth_map.points_world()[::97]
-    laser = apply(depth_map.T_world_range, depth_map.lights[0])
+    laser = apply(depth_map.T_world_range, FINDER.laser)
     for share in np.linspace(0.5, 0.97, 25):
         local = np.abs(apply(inverse(T_BOX), laser + share * (points - laser)))
         assert not (local < SIZE / 2 - 0.001).all(axis=1).any()
+
+
+def test_where_light_passed_nothing_truly_is(depth_map):
+    """Above `passed` every cell is empty in truth: the columns of the true box never reach above it."""
+    j, i = np.mgrid[: depth_map.elevation.shape[0], : depth_map.elevation.shape[1]]
+    above = np.stack([(i + 0.5) * depth_map.cell, (j + 0.5) * depth_map.cell, depth_map.passed + 0.002], axis=-1).reshape(-1, 3)
+    local = np.abs(apply(inverse(T_BOX), apply(depth_map.T_world_range, above)))
+    assert not (local < SIZE / 2 - 0.001).all(axis=1).any()
 
 
 def test_a_seed_gives_the_same_scan_and_another_seed_another():

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from handey_studio.geometry import Polyhedron, box
 from handey_studio.geometry.transforms import apply, inverse, transform
-from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.sensing.depth_map import SKY_M, DepthMap
 from handey_studio.sensing.depth_view import DepthView, Pinhole
 
 Placed = tuple[Polyhedron, NDArray]
@@ -52,7 +52,7 @@ def map_from_above(bodies: Sequence[Placed], rng: np.random.Generator, noise: fl
     seen = lit(mesh, points, LIGHT) & (lit(mesh, points, EYES[0]) | lit(mesh, points, EYES[1]))
     z = points[:, 2] + rng.normal(0.0, noise, x.size)
     z[~seen | (rng.random(x.size) < dropped)] = np.nan
-    return DepthMap(z.reshape(x.shape), 0.001, T_WORLD_RANGE, LIGHT[None], np.zeros(x.shape), noise=noise)
+    return DepthMap(z.reshape(x.shape), 0.001, T_WORLD_RANGE, np.nan_to_num(z.reshape(x.shape), nan=SKY_M), noise=noise)
 
 
 def oblique_view(

@@ -90,9 +90,20 @@ def test_readings_outside_the_area_or_not_finite_are_dropped():
     assert np.isnan(fuse(FINDER, np.empty((0, 3))).elevation).all()
 
 
-def test_every_reading_is_lit_by_the_laser():
-    depth_map = fuse(FINDER, patch(0.1, 0.12, 0.1, 0.12, 0.0))
-    assert np.array_equal(depth_map.lights, FINDER.laser[None]) and not depth_map.source.any()
+def test_light_passed_over_a_hole_on_its_way_to_the_readings_beyond():
+    """Over a hole the laser's light came down to its slope; a camera's line of sight counts too, where that camera saw the reading."""
+    ground = patch(0.05, 0.35, 0.15, 0.25, 0.0)
+    hole = (ground[:, 0] > 0.30) & (ground[:, 0] < 0.31)
+    readings = np.concatenate([ground[~hole], patch(0.05, 0.07, 0.05, 0.07, 0.2)])  # lines are followed up to the highest reading
+    by_laser = fuse(FINDER, readings)
+    cells = np.isnan(by_laser.elevation[160:240, 300:310])
+    assert cells.any()
+    heights = by_laser.passed[160:240, 300:310][cells]
+    slope = FINDER.laser[2] / (0.31 - FINDER.laser[0])
+    assert (heights > 0).all() and heights.max() < 1.3 * slope * 0.01
+    for camera in range(len(FINDER.cameras)):
+        seen = fuse(FINDER, readings, np.full(len(readings), camera)).passed[160:240, 300:310][cells]
+        assert (seen <= heights + 1e-12).all() and (seen < heights - 0.001).any()
 
 
 @pytest.mark.parametrize(

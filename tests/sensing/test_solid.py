@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.sensing.light_paths import passing_heights
 from handey_studio.sensing.solid import solid_columns, without_parts
 from handey_studio.world import Part, PlacedPart
 
@@ -25,7 +26,10 @@ def shadowed(height, low, high):
 
 
 def depth_map(elevation):
-    return DepthMap(elevation, CELL, np.eye(4), LIGHT[None], np.zeros(elevation.shape, np.uint8), noise=0.0003, outline_error=0.001)
+    j, i = np.nonzero(np.isfinite(elevation))
+    readings = np.c_[(i + 0.5) * CELL, (j + 0.5) * CELL, elevation[j, i]]
+    passed = passing_heights(elevation, CELL, readings, np.broadcast_to(LIGHT, readings.shape))
+    return DepthMap(elevation, CELL, np.eye(4), passed, noise=0.0003, outline_error=0.001)
 
 
 @settings(max_examples=15, deadline=None)

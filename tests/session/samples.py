@@ -27,7 +27,7 @@ def hand_made_scan(cells: int = 80, cell: float = 0.005, seed: int = 0) -> Depth
     elevation[50:60, 50:58] += 0.055
     elevation[rng.random(elevation.shape) < 0.02] = np.nan
     T_world_range = from_xyz_rpy((0.48 - cells * cell / 2, -cells * cell / 2, 0.0))
-    return DepthMap(elevation, cell, T_world_range, np.array([[0.2, 0.2, 1.2]]), np.zeros(elevation.shape))
+    return DepthMap(elevation, cell, T_world_range, np.nan_to_num(elevation, nan=0.05))
 
 
 def hand_made_plan(robot: Robot, part: str = "l_block#1") -> MovePlan:
