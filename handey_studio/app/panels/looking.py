@@ -11,15 +11,15 @@ from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
 from handey_studio.session import LAYERS
 
-VIEWS = ("Workcell", "Pile", "Top", "Grasp", "Hand")
+VIEWS = (("View", ("Workcell", "Pile", "Top")), ("Close-up", ("Grasp", "Hand")))
 
 
 class LookingPanel:
     """View buttons, layers, legend."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
-        buttons = gui.add_button_group("View", VIEWS)
-        on_click(buttons, send, lambda event: LookFrom(event.target.value, event.client_id))
+        for label, views in VIEWS:
+            on_click(gui.add_button_group(label, views), send, lambda event: LookFrom(event.target.value, event.client_id))
         self._legend = gui.add_html("")
         self._layers = {}
         with gui.add_folder("Show", expand_by_default=True):

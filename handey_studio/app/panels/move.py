@@ -17,6 +17,10 @@ from handey_studio.session.destination import destinations_on_parts
 from handey_studio.task.destination import format_pose
 
 NO_PART = "–"
+KEYS = (
+    '<div style="margin:14px 14px 6px;font-size:11.5px;line-height:1.6;color:#8a94a0">Space plays, J and L go by steps, 1 to 5 look from '
+    "elsewhere, P plans, M moves. Ctrl+K lists every command. Click a located part to choose it, a data edge to read about it.</div>"
+)
 
 
 class MovePanel:
@@ -38,6 +42,7 @@ class MovePanel:
         with gui.add_folder("Options", expand_by_default=False):
             self._seed = gui.add_number("Seed", 0, min=0, max=2**31 - 1, step=1, hint="The same seed gives the same plan")
             self._reset = gui.add_button("Reset the cell", icon=viser.Icon.REFRESH, color="gray", hint="As it was before the first MOVE")
+        gui.add_html(KEYS)
         self._wire(send)
 
     def _wire(self, send: Send) -> None:
