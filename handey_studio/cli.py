@@ -18,7 +18,7 @@ from handey_studio.localization.report import locate_report
 from handey_studio.sensing.files import read_depth
 from handey_studio.sensing.support import support_plane
 from handey_studio.session import Session, find_session, read_session, write_session
-from handey_studio.session.run import cell_of, setup_of, station_of
+from handey_studio.session.run import cell_of, station_of
 from handey_studio.task import MoveCommand, MoveOptions, MoveResult, run_move
 from handey_studio.task.bench import bench_piles
 from handey_studio.task.report import move_report
@@ -151,7 +151,7 @@ def _run_moves(given: argparse.Namespace, execute: bool) -> int:
     if given.json:
         _write_json(given.json, move_report(results, station.robot))
     if given.save:
-        now = setup_of(session, cell) if execute else session.cell_now
+        now = cell.setup_now() if execute else session.cell_now
         write_session(given.save, replace(session, commands=commands, seed=seed, scene=scene, results=tuple(results), cell_now=now))
     return DONE if len(results) == len(commands) and all(result.status != "failed" for result in results) else FAILED
 

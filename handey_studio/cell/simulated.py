@@ -110,10 +110,10 @@ class SimulatedCell:
         return self._held.name if self._held else None
 
     def setup_now(self) -> SimulatedSetup:
-        """The true state as a setup, so that a session can go on from it. What the hand holds is where the hand has it."""
+        """The true state as a setup, so that a session can go on from it. What the hand still holds falls from there until it rests."""
         now = {body.name: body.T_world_body for body in self._bodies}
         bodies = tuple(replace(body, T_world_body=now[body.name]) for body in self._workcell.setup.bodies)
-        return replace(self._workcell.setup, bodies=bodies, drop=False)
+        return replace(self._workcell.setup, bodies=bodies, drop=self._held is not None)
 
     def _check(self, motion: Motion) -> None:
         q, times = motion.q_rad, motion.time_s

@@ -6,7 +6,6 @@ from typing import Protocol
 from handey_studio.base import BadInput, Progress, Share
 from handey_studio.cell.protocol import CannotAct
 from handey_studio.cell.simulated import SimulatedCell
-from handey_studio.cell.workcell import SimulatedSetup
 from handey_studio.session.session import Session
 from handey_studio.task import MoveOptions, MoveResult, Station, check_command, execute_in, plan_in, sense
 from handey_studio.world import Library
@@ -63,7 +62,7 @@ def _executed(session: Session, station: Station, cell: SimulatedCell, progress:
     if session.scene is None:
         return session
     result = execute_in(station, session.scene, session.results[-1], cell, Share(progress, PLANNED, 1.0))
-    return replace(session, results=(result,), cell_now=setup_of(session, cell, fall=result.status != "done"))
+    return replace(session, results=(result,), cell_now=cell.setup_now())
 
 
 def station_of(session: Session, library: Library) -> Station:
@@ -75,13 +74,3 @@ def cell_of(session: Session, library: Library) -> SimulatedCell:
     """The simulated cell as the session's last execution left it."""
     workcell = session.workcell
     return SimulatedCell(workcell if session.cell_now is None else replace(workcell, setup=session.cell_now), library)
-
-
-def setup_of(session: Session, cell: SimulatedCell, fall: bool) -> SimulatedSetup:
-    """Where the cell's bodies stand now. It is kept so that the next MOVE finds the cell as it was left; no planner reads it.
-
-    With `fall`, what an execution that ended early still held falls until it rests.
-    """
-    before = session.cell_now or session.workcell.setup
-    bodies = tuple(replace(body, T_world_body=cell.true_pose(body.name)) for body in before.bodies)
-    return SimulatedSetup(bodies, drop=fall, seed=before.seed)

@@ -116,9 +116,10 @@ def _why_none(entries: tuple[Entry, ...]) -> str:
         return "the hand cannot grasp this part: " + (describe(entries[-1]) if entries else "it has no pair of parallel faces")
     counts = Counter(entry.reason for entry in groups)
     said = "; ".join(f"{count} × {reason}" for reason, count in counts.most_common(3))
-    at_pickup = sum(count for reason, count in counts.items() if reason and reason.endswith("at the pickup"))
     text = f"none of {len(groups)} grasp groups works: {said}"
-    if at_pickup < len(groups) and not any(reason and reason.startswith("no arm motion") for reason in counts):
+    at_pickup = [reason for reason in counts if reason and reason.endswith("at the pickup")]
+    for_putdown = [reason for reason in counts if reason and "putdown" in reason]
+    if for_putdown and len(at_pickup) + len(for_putdown) == len(counts):
         text += "; no grasp serves both ends, so this MOVE needs a regrasp, which is not built yet"
     return text
 
