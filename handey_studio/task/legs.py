@@ -11,9 +11,10 @@ from handey_studio.task.grasp_search import CLOSED_MARGIN_M, Grasp, finger_pairs
 from handey_studio.task.options import Pairs
 from handey_studio.task.plan import MovePlan, Step, StepKind
 from handey_studio.world import Held, World
+from handey_studio.world.collision import collision_model
 
-LIFT_M = 0.06  # straight up from where it stood before the part is carried anywhere
-DESCENT_M = 0.06  # and straight down onto its destination
+HEIGHTS_M = (0.06, 0.10, 0.14, 0.18)  # straight up from where the part stands: the first at which nothing is near any more
+CLEAR_M = 0.003
 STRAIGHT_STEP_M = 0.005
 FINGER_SPEED_M_S = 0.05
 MAX_PAIRS = 6  # IK branches at pickup × putdown that are tried for one grasp
@@ -89,7 +90,7 @@ def _pickup_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
     into = _straight(goal.at_start, q, grasp.approach_hands[::-1], choice.opening, None, (), "approach", grasp.entry, ledger)
     if into is None:
         return None
-    lifted = _raised(grasp.T_world_hand_pickup, LIFT_M)
+    lifted = _raised(grasp, grasp.T_world_hand_pickup)
     allowed = goal.supports_at_start
     away = _straight(goal.carried, q, lifted, choice.width, held_part(grasp), allowed, "lift", grasp.entry, ledger)
     return None if away is None else _End(q, _reversed(into), away)
@@ -98,7 +99,7 @@ def _pickup_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
 def _putdown_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
     """Placement and retreat with one IK branch."""
     goal, choice = grasp.option.goal, grasp.choice
-    raised = _raised(grasp.T_world_hand_putdown, DESCENT_M)
+    raised = _raised(grasp, grasp.T_world_hand_putdown)
     down = _straight(goal.carried, q, raised, choice.width, held_part(grasp), goal.supports_at_goal, "place", grasp.entry, ledger)
     if down is None:
         return None
@@ -218,8 +219,15 @@ def _reversed(path: PathResult) -> PathResult:
     return replace(path, q_rad=path.q_rad[::-1], certificate=certificate, legs=())
 
 
-def _raised(T_world_hand: NDArray, height: float) -> NDArray:
-    """Hand poses (k, 4, 4) straight up from one."""
+def _raised(grasp: Grasp, T_world_hand: NDArray) -> NDArray:
+    """Hand poses (k, 4, 4) straight up from one, until the part and the hand are clear of all that they stood beside."""
+    model, held = collision_model(grasp.option.goal.carried), held_part(grasp)
+    height = HEIGHTS_M[-1]
+    for height in HEIGHTS_M:
+        raised = T_world_hand.copy()
+        raised[2, 3] += height
+        if model.hand_contact(raised, grasp.choice.width, held, limit=2 * CLEAR_M).keeps(CLEAR_M):
+            break
     poses = np.repeat(T_world_hand[None], 1 + round(height / STRAIGHT_STEP_M), axis=0)
     poses[:, 2, 3] += np.linspace(0.0, height, len(poses))
     return poses
