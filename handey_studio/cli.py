@@ -7,23 +7,19 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from handey_studio.base import BadInput, Entry, describe
 from handey_studio.base.files import replace_file
-from handey_studio.localization import LocateOptions, localize
-from handey_studio.localization.report import locate_report
-from handey_studio.sensing.files import read_depth
-from handey_studio.sensing.support import support_plane
-from handey_studio.session import Session, find_session, read_session, write_session
-from handey_studio.session.run import cell_of, station_of
-from handey_studio.task import MoveCommand, MoveOptions, MoveResult, run_move
-from handey_studio.task.bench import bench_piles
-from handey_studio.task.report import move_report
 from handey_studio.world import Library
 
+if TYPE_CHECKING:
+    from handey_studio.session import Session
+    from handey_studio.task import MoveCommand, MoveResult
+
+# Each command imports the rooms that it needs when it runs: together they take seconds to load.
 DONE, FAILED, BAD_INPUT, NOTHING_FOUND = 0, 1, 2, 3
 
 
@@ -94,7 +90,8 @@ def _move_arguments(move: argparse.ArgumentParser) -> None:
 
 
 def _studio(given: argparse.Namespace) -> int:
-    from handey_studio.app import run  # the workbench's libraries are loaded only when it is opened
+    from handey_studio.app import run
+    from handey_studio.session import find_session
 
     library = Library.choose(given.library)
     run(find_session(library, given.session), host=given.host, port=given.port, library=library)
@@ -102,6 +99,11 @@ def _studio(given: argparse.Namespace) -> int:
 
 
 def _locate(given: argparse.Namespace) -> int:
+    from handey_studio.localization import LocateOptions, localize
+    from handey_studio.localization.report import locate_report
+    from handey_studio.sensing.files import read_depth
+    from handey_studio.sensing.support import support_plane
+
     library = Library.choose(given.library)
     parts = [library.part(name, given.part_scale) for name in given.part]
     begun = time.perf_counter()
@@ -136,6 +138,11 @@ def _plan(given: argparse.Namespace) -> int:
 
 
 def _run_moves(given: argparse.Namespace, execute: bool) -> int:
+    from handey_studio.session import find_session, read_session, write_session
+    from handey_studio.session.run import cell_of, station_of
+    from handey_studio.task import MoveOptions, run_move
+    from handey_studio.task.report import move_report
+
     library = Library.choose(given.library)
     session = read_session(find_session(library, given.session))
     commands = _commands(given, session)
@@ -156,7 +163,9 @@ def _run_moves(given: argparse.Namespace, execute: bool) -> int:
     return DONE if len(results) == len(commands) and all(result.status != "failed" for result in results) else FAILED
 
 
-def _commands(given: argparse.Namespace, session: Session) -> tuple[MoveCommand, ...]:
+def _commands(given: argparse.Namespace, session: "Session") -> "tuple[MoveCommand, ...]":
+    from handey_studio.task import MoveCommand
+
     if (given.part is None) != (given.to is None):
         raise BadInput("--part and --to go together: MOVE part TO destination.")
     if given.part is not None:
@@ -166,7 +175,7 @@ def _commands(given: argparse.Namespace, session: Session) -> tuple[MoveCommand,
     return session.commands
 
 
-def _tell(result: MoveResult) -> None:
+def _tell(result: "MoveResult") -> None:
     stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in result.timing_s.items())
     print(f"MOVE {result.command.part} TO {result.command.to}: {result.status}{': ' + result.reason if result.reason else ''}")
     print(f"  {stages}")
@@ -193,6 +202,8 @@ class _Lines:
 
 
 def _bench(given: argparse.Namespace) -> int:
+    from handey_studio.task.bench import bench_piles
+
     report = bench_piles(given.seeds, Library.choose(given.library), tell=print)
     if given.json:
         _write_json(given.json, report)

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import import_module
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput, frozen_array
@@ -15,7 +14,14 @@ from handey_studio.geometry.transforms import inverse
 from handey_studio.world.ik import IK_SOLVERS
 from handey_studio.world.robot import Robot
 
-pin: Any = import_module("pinocchio")  # compiled, without type information
+if TYPE_CHECKING:
+    import trimesh
+
+
+@lru_cache(maxsize=1)
+def _pinocchio() -> Any:
+    """Pinocchio, which is compiled and has no type information; imported when an arm is first built, as it takes half a second."""
+    return import_module("pinocchio")
 
 
 FULL_SHARE = 0.8  # a link that fills this share of its hull is taken for it
@@ -42,6 +48,7 @@ class Arm:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
+        pin = _pinocchio()
         try:
             full, collision, _ = pin.buildModelsFromUrdf(robot.urdf, [robot.packages])
         except (ValueError, RuntimeError) as error:
@@ -124,7 +131,7 @@ def _rotations(axis: NDArray, angles: NDArray) -> NDArray:
 
 def _joint_axis(model: Any, joint: int) -> NDArray:
     """Axis of a revolute joint in its own frame, read off its motion subspace."""
-    data = model.createData()
+    pin, data = _pinocchio(), model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))
     column = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)[:, model.joints[joint].idx_v]
     if np.abs(column[:3]).max() > 1e-9 or model.joints[joint].nv != 1:
@@ -134,6 +141,8 @@ def _joint_axis(model: Any, joint: int) -> NDArray:
 
 def _link_body(geometry: Any) -> LinkBody:
     """Mesh of a collision object in its link's frame."""
+    import trimesh  # slow to import, and only arms and foreign meshes need it
+
     path = geometry.meshPath
     if path and path not in ("BOX", "CYLINDER", "SPHERE"):
         mesh = trimesh.load_mesh(path)
@@ -150,7 +159,7 @@ def _link_body(geometry: Any) -> LinkBody:
     )
 
 
-def _hulls(mesh: trimesh.Trimesh) -> tuple[NDArray, ...]:
+def _hulls(mesh: "trimesh.Trimesh") -> tuple[NDArray, ...]:
     """Convex pieces that hold a mesh."""
     whole = mesh.convex_hull
     if not mesh.is_watertight or mesh.volume > FULL_SHARE * whole.volume:
@@ -166,7 +175,9 @@ def _hulls(mesh: trimesh.Trimesh) -> tuple[NDArray, ...]:
     return tuple(pieces)
 
 
-def _primitive(geometry: Any) -> trimesh.Trimesh:
+def _primitive(geometry: Any) -> "trimesh.Trimesh":
+    import trimesh
+
     shape = geometry.geometry
     if hasattr(shape, "halfSide"):
         return trimesh.creation.box(2 * np.asarray(shape.halfSide))

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron, polyhedron_from_polygons
@@ -96,6 +95,8 @@ def _read_obj(path: Path) -> tuple[np.ndarray, list[list[int]]]:
 
 
 def _read_mesh(path: Path) -> tuple[np.ndarray, list[list[int]]]:
+    import trimesh  # slow to import, and only arms and foreign meshes need it
+
     try:
         mesh = trimesh.load_mesh(path, process=False)
         return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces).tolist()
