@@ -117,10 +117,9 @@ def _why_none(entries: tuple[Entry, ...]) -> str:
     counts = Counter(entry.reason for entry in groups)
     said = "; ".join(f"{count} × {reason}" for reason, count in counts.most_common(3))
     text = f"none of {len(groups)} grasp groups works: {said}"
-    at_pickup = [reason for reason in counts if reason and reason.endswith("at the pickup")]
-    for_putdown = [reason for reason in counts if reason and "putdown" in reason]
-    if for_putdown and len(at_pickup) + len(for_putdown) == len(counts):
-        text += "; no grasp serves both ends, so this MOVE needs a regrasp, which is not built yet"
+    pickup_only = sum(count for reason, count in counts.items() if reason and "putdown" in reason)
+    if pickup_only and not any(reason and reason.startswith("no arm motion") for reason in counts):
+        text += f"; {pickup_only} are free at the pickup but not at the putdown: this MOVE needs a regrasp, which is not built yet"
     return text
 
 
