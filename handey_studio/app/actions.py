@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.app.commands import JobStarted
+from handey_studio.app.jobs import JobStarted
 from handey_studio.app.state import State, opened
 from handey_studio.base import BadInput
 from handey_studio.session import (

@@ -7,17 +7,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.app.state import Job, State, redone, undone
+from handey_studio.app.state import State, redone, undone, with_view
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import is_rigid
-from handey_studio.session import Session
 from handey_studio.session.destination import check_command, destination_pose, destinations_on_parts, snapped
 from handey_studio.session.looking import edge_at
 from handey_studio.task.destination import format_pose
-from handey_studio.task.plan import MoveCommand, MoveResult
+from handey_studio.task.plan import MoveCommand
 
 POSE_LABEL = "a pose on the table"
-CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
 FREE_TABLE = "0.35,-0.35,0,0,0,0"  # beside the scan area, in every robot's reach
 
 
@@ -100,74 +98,6 @@ class Undo:
 class Redo:
     def apply(self, state: State) -> State:
         return redone(state)
-
-
-@dataclass(frozen=True)
-class Seek:
-    """Look at this time [s] of the plan."""
-
-    time_s: float
-    keep_playing: bool = False
-
-    def apply(self, state: State) -> State:
-        replay = state.replay
-        time_s = float(np.clip(self.time_s, 0.0, replay.duration)) if replay else 0.0
-        return replace(with_view(state, time_s=time_s), playing=state.playing and self.keep_playing)
-
-
-@dataclass(frozen=True)
-class SeekStep:
-    """To the start of the step before (-1) or after (+1); ±99 goes to the ends."""
-
-    by: int
-
-    def apply(self, state: State) -> State:
-        replay = state.replay
-        if replay is None:
-            return state
-        now = state.session.view.time_s
-        later = [t for t in replay.starts if t > now + 1e-6] or [replay.duration]
-        earlier = [t for t in replay.starts if t < now - 1e-6] or [0.0]
-        ends = {99: replay.duration, -99: 0.0}
-        return Seek(ends.get(self.by, later[0] if self.by > 0 else earlier[-1])).apply(state)
-
-
-@dataclass(frozen=True)
-class TogglePlay:
-    """Play from here, or from the start when the end was reached; or pause."""
-
-    def apply(self, state: State) -> State:
-        replay = state.replay
-        if replay is None:
-            return replace(state, playing=False)
-        if not state.playing and state.session.view.time_s >= replay.duration - 1e-6:
-            state = with_view(state, time_s=0.0)
-        return replace(state, playing=not state.playing)
-
-
-@dataclass(frozen=True)
-class Tick:
-    """This much wall-clock time [s] went by while playing."""
-
-    seconds: float
-
-    def apply(self, state: State) -> State:
-        replay = state.replay
-        if not state.playing or replay is None:
-            return replace(state, playing=False)
-        time_s = state.session.view.time_s + self.seconds * state.speed
-        if time_s < replay.duration:
-            return with_view(state, time_s=time_s)
-        return with_view(state, time_s=0.0) if state.loop else replace(with_view(state, time_s=replay.duration), playing=False)
-
-
-@dataclass(frozen=True)
-class SetPlayback:
-    speed: float | None = None
-    loop: bool | None = None
-
-    def apply(self, state: State) -> State:
-        return replace(state, speed=self.speed or state.speed, loop=state.loop if self.loop is None else self.loop)
 
 
 @dataclass(frozen=True)
@@ -264,94 +194,6 @@ class Tell:
 
     def apply(self, state: State) -> State:
         return state.told(self.text, self.kind, self.client)
-
-
-@dataclass(frozen=True)
-class JobProgress:
-    number: int
-    fraction: float
-    message: str
-
-    def apply(self, state: State) -> State:
-        if state.job is None or state.job.number != self.number:
-            return state
-        return replace(state, job=replace(state.job, fraction=max(state.job.fraction, self.fraction), message=self.message))
-
-
-@dataclass(frozen=True, eq=False)
-class JobShows:
-    """The planner has something to show before it is done: the session with what was found so far."""
-
-    number: int
-    session: Session
-
-    def apply(self, state: State) -> State:
-        if state.job is None or state.job.number != self.number:
-            return state
-        return replace(state, session=merged(state.session, self.session), playing=False)
-
-
-@dataclass(frozen=True, eq=False)
-class JobDone:
-    """The planner is through; the result plays from its start."""
-
-    number: int
-    session: Session
-
-    def apply(self, state: State) -> State:
-        if state.job is None or state.job.number != self.number:
-            return state
-        session = merged(state.session, self.session)
-        state = replace(state, session=session, job=None)
-        state = with_view(state, time_s=0.0, result=-1)
-        result = session.result
-        if result is None:
-            return state
-        kind = "good" if result.status != "failed" else "info" if result.reason == CANCELLED else "bad"
-        return replace(state, playing=state.replay is not None).told(outcome(result), kind)
-
-
-@dataclass(frozen=True)
-class JobFailed:
-    """The planner could not start on this, or broke down; the sentence says which."""
-
-    number: int
-    sentence: str
-
-    def apply(self, state: State) -> State:
-        if state.job is None or state.job.number != self.number:
-            return state
-        return replace(state, job=None).told(self.sentence, "bad")
-
-
-@dataclass(frozen=True)
-class JobStarted:
-    execute: bool
-
-    def apply(self, state: State) -> State:
-        return replace(state, jobs=state.jobs + 1, playing=False, job=Job(state.jobs + 1, self.execute))
-
-
-def with_view(state: State, **changes) -> State:
-    """The state with its view changed."""
-    return replace(state, session=replace(state.session, view=replace(state.session.view, **changes)))
-
-
-def merged(shown: Session, found: Session) -> Session:
-    """What the planner found put into the session on screen, whose settings may have changed meanwhile."""
-    return replace(shown, scene=found.scene, results=found.results, cell_now=found.cell_now)
-
-
-def outcome(result: MoveResult) -> str:
-    """One sentence about a result."""
-    what = f"MOVE {result.command.part} TO {result.command.to}"
-    if result.reason == CANCELLED:
-        return f"{what} was cancelled."
-    if result.status == "failed":
-        return f"{what} failed: {result.reason}"
-    steps = result.plan.steps if result.plan else ()
-    seconds = sum(float(step.time_s[-1]) for step in steps)
-    return f"{what} is {'done' if result.status == 'done' else 'planned'}: {len(steps)} steps, {seconds:.1f} s."
 
 
 def _with_command(state: State, label: str, command: MoveCommand) -> State:

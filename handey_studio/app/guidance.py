@@ -1,6 +1,6 @@
 """What to do next, said in one sentence for every state that the workbench can be in."""
 
-from handey_studio.app.commands import CANCELLED
+from handey_studio.app.jobs import CANCELLED
 from handey_studio.app.state import Job, State
 from handey_studio.session.run import PLANNED, SENSED
 

@@ -5,8 +5,9 @@ from typing import Any
 import viser
 
 from handey_studio.app.actions import CancelMove, LookFrom, SaveSession, StartMove
-from handey_studio.app.commands import Redo, SeekStep, TogglePlay, Undo
+from handey_studio.app.commands import Redo, Undo
 from handey_studio.app.panels.session import SessionPanel
+from handey_studio.app.playback import SeekStep, TogglePlay
 from handey_studio.app.wire import Send, on_trigger
 
 KEYS: tuple[tuple[str, Any, Any, Any], ...] = (

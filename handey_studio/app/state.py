@@ -136,6 +136,11 @@ def redone(state: State) -> State:
     return replace(state, session=change.before.put_into(state.session), undo=(*state.undo, back), redo=state.redo[:-1])
 
 
+def with_view(state: State, **changes) -> State:
+    """The state with its view changed."""
+    return replace(state, session=replace(state.session, view=replace(state.session.view, **changes)))
+
+
 @lru_cache(maxsize=4)
 def _replay(robot: Robot, plan) -> Replay:
     return Replay(robot, plan)

@@ -12,9 +12,11 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from handey_studio.app.commands import CameraMoved, JobDone, JobFailed, JobProgress, JobShows, Tell, Tick, Viewers
+from handey_studio.app.commands import CameraMoved, Tell, Viewers
+from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows
 from handey_studio.app.palette import BLUE, TEAL, VERMILLION
 from handey_studio.app.planner import Failed, Finished, Planner, Progressed, Run, Shown
+from handey_studio.app.playback import Tick
 from handey_studio.app.scene.units import SCALE, metres
 from handey_studio.app.state import State, opened
 from handey_studio.app.view import View

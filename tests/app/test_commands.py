@@ -12,27 +12,19 @@ from handey_studio.app.commands import (
     DropGhost,
     FilterLedger,
     FreePose,
-    JobDone,
-    JobFailed,
-    JobProgress,
-    JobShows,
-    JobStarted,
     PointAt,
     Redo,
     ResetCell,
-    Seek,
-    SeekStep,
     Select,
     SetDestination,
-    SetPlayback,
     SetSeed,
     ShowLayer,
-    Tick,
-    TogglePlay,
     Undo,
 )
 from handey_studio.app.guidance import next_step
+from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows, JobStarted
 from handey_studio.app.panels.ledger import chosen
+from handey_studio.app.playback import Seek, SeekStep, SetPlayback, Tick, TogglePlay
 from handey_studio.app.state import MAX_UNDO, Settings, opened
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy

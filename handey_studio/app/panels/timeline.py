@@ -5,8 +5,8 @@ from typing import Any
 import viser
 
 from handey_studio.app import html
-from handey_studio.app.commands import Seek, SeekStep, SetPlayback, TogglePlay
 from handey_studio.app.palette import STEP_COLOURS, css
+from handey_studio.app.playback import Seek, SeekStep, SetPlayback, TogglePlay
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
 from handey_studio.session import Replay

@@ -1,0 +1,92 @@
+"""What the planner says, as commands: it started, got on, has something to show, is done, or failed."""
+
+from dataclasses import dataclass, replace
+
+from handey_studio.app.state import Job, State, with_view
+from handey_studio.session import Session
+from handey_studio.task.plan import MoveResult
+
+CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
+
+
+@dataclass(frozen=True)
+class JobProgress:
+    number: int
+    fraction: float
+    message: str
+
+    def apply(self, state: State) -> State:
+        if state.job is None or state.job.number != self.number:
+            return state
+        return replace(state, job=replace(state.job, fraction=max(state.job.fraction, self.fraction), message=self.message))
+
+
+@dataclass(frozen=True, eq=False)
+class JobShows:
+    """The planner has something to show before it is done: the session with what was found so far."""
+
+    number: int
+    session: Session
+
+    def apply(self, state: State) -> State:
+        if state.job is None or state.job.number != self.number:
+            return state
+        return replace(state, session=merged(state.session, self.session), playing=False)
+
+
+@dataclass(frozen=True, eq=False)
+class JobDone:
+    """The planner is through; the result plays from its start."""
+
+    number: int
+    session: Session
+
+    def apply(self, state: State) -> State:
+        if state.job is None or state.job.number != self.number:
+            return state
+        session = merged(state.session, self.session)
+        state = replace(state, session=session, job=None)
+        state = with_view(state, time_s=0.0, result=-1)
+        result = session.result
+        if result is None:
+            return state
+        kind = "good" if result.status != "failed" else "info" if result.reason == CANCELLED else "bad"
+        return replace(state, playing=state.replay is not None).told(outcome(result), kind)
+
+
+@dataclass(frozen=True)
+class JobFailed:
+    """The planner could not start on this, or broke down; the sentence says which."""
+
+    number: int
+    sentence: str
+
+    def apply(self, state: State) -> State:
+        if state.job is None or state.job.number != self.number:
+            return state
+        return replace(state, job=None).told(self.sentence, "bad")
+
+
+@dataclass(frozen=True)
+class JobStarted:
+    execute: bool
+
+    def apply(self, state: State) -> State:
+        return replace(state, jobs=state.jobs + 1, playing=False, job=Job(state.jobs + 1, self.execute))
+
+
+def merged(shown: Session, found: Session) -> Session:
+    """What the planner found put into the session on screen, whose settings may have changed meanwhile."""
+    return replace(shown, scene=found.scene, results=found.results, cell_now=found.cell_now)
+
+
+def outcome(result: MoveResult) -> str:
+    """One sentence about a result."""
+    what = f"MOVE {result.command.part} TO {result.command.to}"
+    if result.reason == CANCELLED:
+        return f"{what} was cancelled."
+    if result.status == "failed":
+        return f"{what} failed: {result.reason}"
+    steps = result.plan.steps if result.plan else ()
+    seconds = sum(float(step.time_s[-1]) for step in steps)
+    return f"{what} is {'done' if result.status == 'done' else 'planned'}: {len(steps)} steps, {seconds:.1f} s."
