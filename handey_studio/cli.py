@@ -104,6 +104,7 @@ def _locate(given: argparse.Namespace) -> int:
     from handey_studio.sensing.files import read_depth
     from handey_studio.sensing.support import support_plane
 
+    _check_output(given.json)
     library = Library.choose(given.library)
     parts = [library.part(name, given.part_scale) for name in given.part]
     begun = time.perf_counter()
@@ -119,7 +120,7 @@ def _locate(given: argparse.Namespace) -> int:
     result = localize(view, parts, options, rng)
     _write_json(given.json, locate_report(result, view.T_world_sensor, timing))
     if not result.poses:
-        print(f"none of {', '.join(part.name for part in parts)} was found: {result.reason}", file=sys.stderr)
+        print(result.reason, file=sys.stderr)
         return NOTHING_FOUND
     for pose in result.poses:
         x, y, z = pose.T_world_part[:3, 3]
@@ -143,6 +144,8 @@ def _run_moves(given: argparse.Namespace, execute: bool) -> int:
     from handey_studio.task import MoveOptions, run_move
     from handey_studio.task.report import move_report
 
+    for output in (given.json, given.save):
+        _check_output(output)
     library = Library.choose(given.library)
     session = read_session(find_session(library, given.session))
     commands = _commands(given, session)
@@ -204,6 +207,7 @@ class _Lines:
 def _bench(given: argparse.Namespace) -> int:
     from handey_studio.task.bench import bench_piles
 
+    _check_output(given.json)
     report = bench_piles(given.seeds, Library.choose(given.library), tell=print)
     if given.json:
         _write_json(given.json, report)
@@ -215,6 +219,12 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
         replace_file(path, (json.dumps(content, allow_nan=False) + "\n").encode())
     except OSError as error:
         raise BadInput(f'"{path}" cannot be written: {error.strerror}.') from None
+
+
+def _check_output(path: Path | None) -> None:
+    """Raises BadInput before any work is done when there is no folder to write into."""
+    if path is not None and not path.parent.is_dir():
+        raise BadInput(f'"{path}" cannot be written: the folder "{path.parent}" does not exist.')
 
 
 def _port(text: str) -> int:

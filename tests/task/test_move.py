@@ -176,6 +176,7 @@ def test_the_whole_move_from_the_shell(tmp_path):
         (("move", "figure1", "--part", "l_block", "--to", "here"), "is not understood"),
         (("locate", "--depth", "no.png", "--camera", "no.json", "--part", "brick", "--json", "x.json"), "no.json"),
         (("studio", "--port", "99999"), "not a port"),
+        (("move", "figure1", "--json", "no/folder/out.json"), 'the folder "no/folder" does not exist'),
         (("fly",), "invalid choice"),
         (("bench", "piles", "--seeds", "a:b"), "FIRST:END"),
     ],
