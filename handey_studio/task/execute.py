@@ -13,9 +13,7 @@ from handey_studio.world import Held, PlacedPart, World, arm_of
 
 GRIP_TOLERANCE_M = 0.0025  # the fingers' width on a part may differ from the model's by this much
 EARLY_M = 0.004  # contact this far above the commanded pose is something else than the support
-SEARCH_M = (
-    0.0015  # and this far below it the guarded descent still looks for the support: what the certificate lets touching bodies overlap
-)
+SEARCH_M = 0.001  # and this far below it the descent still looks for its support: no deeper than touching bodies may overlap
 GUARDED_SPEED = 0.25
 
 
