@@ -9,6 +9,8 @@ RGB = tuple[int, int, int]
 
 BLUE: RGB = (0, 96, 168)  # what the user sets: the destination
 SKY: RGB = (86, 180, 233)  # hypotheses
+UNSCANNED: RGB = (176, 182, 190)  # what stands in the cell and was not scanned yet
+LIGHT: RGB = (150, 186, 222)  # the edges of the laser's light
 ORANGE: RGB = (236, 142, 32)  # what was located: parts
 VERMILLION: RGB = (204, 76, 24)  # what collided or fell
 TEAL: RGB = (0, 133, 124)  # the grasp

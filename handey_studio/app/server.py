@@ -1,6 +1,7 @@
 """Starting the workbench: the address, the session, the browser."""
 
 import errno
+import logging
 import os
 import socket
 import threading
@@ -40,6 +41,7 @@ def start(
         session = read_session(path)
     robot = library.robot(session.workcell.robot)
     check_port(host, port)
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # a probe of the port is no news for the terminal
     server = viser.ViserServer(host=host, port=port, label="Handey Studio", verbose=False)
     if server.get_port() != port:
         server.stop()

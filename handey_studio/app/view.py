@@ -16,6 +16,7 @@ from handey_studio.app.scene.depth import DepthScene
 from handey_studio.app.scene.destination import DestinationScene
 from handey_studio.app.scene.findings import PlanScene
 from handey_studio.app.scene.parts import PartsScene
+from handey_studio.app.scene.pile import PileScene
 from handey_studio.app.scene.robot import RobotScene
 from handey_studio.app.scene.sensing import SensingScene
 from handey_studio.app.scene.workcell import WorkcellScene
@@ -39,7 +40,7 @@ class View:
         self._server = server
         server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
         scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server, send)]
-        scenes += [DestinationScene(server, send), SensingScene(server, send), PlanScene(server)]
+        scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), PlanScene(server)]
         session = SessionPanel(server, send)
         self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()

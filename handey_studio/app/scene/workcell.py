@@ -2,10 +2,14 @@
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from handey_studio.app import palette
 from handey_studio.app.scene.units import SCALE, place, scaled
 from handey_studio.app.state import State
+from handey_studio.cell import Workcell
+from handey_studio.geometry.transforms import apply
+from handey_studio.sensing.range_finder import RangeFinder
 
 TABLE_M = (1.3, 1.3, 0.03)
 TABLE_AT_M = (0.25, 0.0)
@@ -25,6 +29,7 @@ class WorkcellScene:
         scene, workcell = self._server.scene, new.session.workcell
         _table(scene, workcell.table_z)
         _scan_outline(scene, workcell)
+        _range_finder(scene, workcell.finder)
         for handle in self._blocks:
             handle.remove()
         self._blocks = []
@@ -71,10 +76,33 @@ def _table(scene: viser.SceneApi, table_z: float) -> None:
     )
 
 
-def _scan_outline(scene: viser.SceneApi, workcell) -> None:
+def _range_finder(scene: viser.SceneApi, finder: RangeFinder) -> None:
+    """The laser with the edges of the light that it sweeps, and the cameras on either side of it."""
+    laser = apply(finder.T_world_range, finder.laser)
+    x, y, z = (float(value) for value in laser * SCALE)
+    scene.add_box("/workcell/finder/laser", color=palette.BLUE, dimensions=(0.5, 0.5, 0.3), position=(x, y, z))
+    rays = np.array([[laser, corner] for corner in _scan_corners(finder)])
+    scene.add_line_segments("/workcell/finder/light", scaled(rays), colors=palette.LIGHT, thickness=1.0, thickness_units="screen")
+    for number, camera in enumerate(finder.cameras):
+        pinhole = camera.projection
+        view = scene.add_camera_frustum(
+            f"/workcell/finder/camera{number}",
+            fov=float(2 * np.arctan(camera.height / 2 / pinhole.fy)),
+            aspect=camera.width / camera.height,
+            scale=0.6,
+            color=palette.BLUE,
+        )
+        place(view, finder.T_world_range @ camera.T_range_camera)
+
+
+def _scan_corners(finder: RangeFinder) -> NDArray:
+    """Corners (4, 3) [m] of the scanned rectangle in the world."""
+    x, y = finder.area
+    return apply(finder.T_world_range, np.array([[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]], dtype=float))
+
+
+def _scan_outline(scene: viser.SceneApi, workcell: Workcell) -> None:
     """The rectangle on the table that the range finder scans."""
-    x, y = workcell.finder.area
-    corners = np.array([[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]], dtype=float)
-    corners = corners @ workcell.finder.T_world_range[:3, :3].T + workcell.finder.T_world_range[:3, 3] + (0, 0, 0.0015)
+    corners = _scan_corners(workcell.finder) + np.array([0, 0, 0.0015])
     sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
     scene.add_line_segments("/workcell/scan_area", scaled(sides), colors=palette.BLUE, thickness=2.0, thickness_units="screen")

@@ -1,0 +1,56 @@
+"""What stands in the simulated cell before anything is scanned: what a person sees who walks up to it.
+
+It is the cell's own state, for the eye alone. Once there is a scan the screen shows what was sensed instead.
+"""
+
+import viser
+
+from handey_studio.app import palette
+from handey_studio.app.scene.parts import add_solid
+from handey_studio.app.state import State
+from handey_studio.cell import TrueBody
+from handey_studio.geometry import box
+from handey_studio.session import Session
+from handey_studio.world import Part
+
+ROOT = "/pile"
+
+
+class PileScene:
+    """One grey solid a body, until the first scan."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._frames: list[viser.FrameHandle] = []
+
+    def render(self, old: State | None, new: State) -> None:
+        if old is None or _setup(old.session) is not _setup(new.session):
+            self._build(new.session)
+            old = None
+        shown = new.session.scan is None
+        if old is None or shown != (old.session.scan is None):
+            for frame in self._frames:
+                frame.visible = shown
+
+    def _build(self, session: Session) -> None:
+        for frame in self._frames:
+            frame.remove()
+        setup = _setup(session)
+        bodies = () if setup.drop else setup.bodies  # what is still to fall stands nowhere yet
+        solids = [(body, solid_of(session, body)) for body in bodies]
+        self._frames = [
+            add_solid(self._server.scene, f"{ROOT}/{number}", part, palette.UNSCANNED, body.T_world_body)[0]
+            for number, (body, part) in enumerate(solids)
+            if part is not None
+        ]
+
+
+def solid_of(session: Session, body: TrueBody) -> Part | None:
+    """The shape of a body: a part of the session, or a cuboid; None when the session does not have that part."""
+    if body.size is not None:
+        return Part(body.name, box(body.size))
+    return session.part(body.part) if body.part else None
+
+
+def _setup(session: Session):
+    return session.cell_now or session.workcell.setup
