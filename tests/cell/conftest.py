@@ -14,6 +14,8 @@ from handey_studio.geometry.transforms import transform
 from handey_studio.world import Library, Robot, arm_of, load_robot
 from handey_studio.world.library import bundled
 
+AHEAD = np.deg2rad([0.0, -110.0, 110.0, -90.0, -90.0, 0.0])
+
 
 @dataclass(frozen=True)
 class PlainStep:
@@ -85,5 +87,8 @@ def arms(robot) -> Arms:
 
 
 @pytest.fixture
-def cell(library) -> SimulatedCell:
-    return SimulatedCell(figure1(), library)
+def cell(library, robot) -> SimulatedCell:
+    """The Figure 1 cell, its arm turned from home to face the pile: straight joint lines from there pass over it."""
+    cell = SimulatedCell(figure1(), library)
+    cell.follow(Motion(np.array([0.0, 2.0]), np.array([robot.home, AHEAD]), np.full(2, robot.hand.opening_max)))
+    return cell

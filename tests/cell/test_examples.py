@@ -13,7 +13,7 @@ from handey_studio.cell.physics import settle
 from handey_studio.cell.stripes import Surfaces
 from handey_studio.geometry.transforms import apply, inverse, pose_difference
 from handey_studio.world import arm_of
-from tests.cell.conftest import over_l_block, raised
+from tests.cell.conftest import AHEAD, over_l_block, raised
 
 
 def bodies_of(library):
@@ -63,11 +63,11 @@ def test_the_task_can_be_done(library, arms, robot, cell):
     goal = base @ library.part("l_block").mates["block"].T_this_part
     T_pick = over_l_block(start, (0.0147, 0.015, 0.02))
     T_put = goal @ inverse(start) @ T_pick
-    down = arms.line(raised(T_pick, 0.12), T_pick, arms.at(raised(T_pick, 0.12), robot.home))
+    down = arms.line(raised(T_pick, 0.12), T_pick, arms.at(raised(T_pick, 0.12), AHEAD))
     place = arms.line(raised(T_put, 0.10), T_put, arms.at(raised(T_put, 0.10), down[0]))
     fingers = (("finger_left", name), ("finger_right", name))
     steps = [
-        arms.step("free", [robot.home, down[0]], 0.1),
+        arms.step("free", [AHEAD, down[0]], 0.1),
         arms.step("approach", down, np.linspace(0.1, 0.06, len(down))),
         arms.step("close", [down[-1]] * 2, (0.06, 0.04), allowed=fingers),
         arms.step("lift", down[::-1], 0.04, name, (*fingers, (name, "table"), (name, "depth map"))),
