@@ -25,17 +25,17 @@ class Value:
     """
 
     @cached_property
-    def _content(self) -> tuple:
-        return tuple(_hashable(getattr(self, f.name)) for f in fields(self))  # type: ignore[arg-type]
+    def _content(self: Any) -> tuple:
+        return tuple(_hashable(getattr(self, f.name)) for f in fields(self))
 
-    def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and self._content == other._content  # type: ignore[attr-defined]
+    def __eq__(self: Any, other: Any) -> bool:
+        return type(other) is type(self) and self._content == other._content
 
-    def __hash__(self) -> int:
+    def __hash__(self: Any) -> int:
         return hash(self._content)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+    def __getstate__(self: Any) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
 def _hashable(value: Any) -> Hashable:
