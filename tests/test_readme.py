@@ -1,0 +1,40 @@
+"""What README shows works as it stands there."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from handey_studio import cli
+
+README = (Path(__file__).parents[1] / "README.md").read_text()
+
+
+def section(title: str) -> str:
+    return README.split(f"## {title}\n")[1].split("\n## ")[0]
+
+
+def code(title: str) -> list[str]:
+    return [line[4:] for line in section(title).splitlines() if line.startswith("    ") or not line.strip()]
+
+
+def shell_lines() -> list[str]:
+    return [line.split("#")[0].strip() for line in code("From the shell") if line.startswith("handey ")]
+
+
+def test_there_are_commands_to_check():
+    assert len(shell_lines()) >= 5
+
+
+@pytest.mark.parametrize("line", shell_lines())
+def test_every_shell_command_is_understood(line):
+    words = shlex.split(re.sub(r"[\[\]]", "", line.replace("[SESSION]", "figure1")))
+    assert cli._parser().parse_args(words[1:]).command == words[1]
+
+
+def test_the_python_example_moves_the_block(capsys):
+    exec(compile("\n".join(code("From Python")), "README.md", "exec"), {})
+    told = capsys.readouterr().out
+    assert "l_block#1" in told and "planned" in told
+    assert told.strip().splitlines()[-1].startswith("[") or "]]" in told, "the pose that was reached"
