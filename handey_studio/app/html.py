@@ -67,11 +67,3 @@ def figure(svg: str, chips: Iterable[tuple[palette.RGB, str]], words: str) -> st
 
 def millimetres(metres: float, digits: int = 0) -> str:
     return f"{1e3 * metres:.{digits}f} mm"
-
-
-def number(value: float, unit: str) -> str:
-    """A ledger's number as people read it: lengths in mm, angles in degrees, without digits that mean nothing."""
-    scales = {"m": (1e3, "mm"), "rad": (57.29577951308232, "°"), "deg": (1.0, "°"), "m²": (1e6, "mm²"), "m2": (1e6, "mm²")}
-    scale, shown = scales.get(unit, (1.0, unit))
-    digits = 2 if shown == "mm" else 1 if shown == "°" else 3
-    return f"{round(value * scale, digits) + 0.0:.10g} {shown}".strip()

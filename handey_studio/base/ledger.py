@@ -82,13 +82,13 @@ def rejected_counts(entries: Iterable[Entry]) -> dict[str, int]:
     return dict(Counter(entry.reason for entry in entries if entry.reason is not None).most_common())
 
 
-SHOWN = {"m": (1e3, "mm"), "m²": (1e6, "mm²"), "rad": (180.0 / math.pi, "°")}
+SHOWN = {"m": (1e3, "mm", 2), "m²": (1e6, "mm²", 0), "rad": (180.0 / math.pi, "°", 1)}
 
 
 def measured(value: float, unit: str) -> str:
-    """A number as people read it: metres as mm, square metres as mm², radians as degrees."""
-    factor, shown = SHOWN.get(unit, (1.0, unit))
-    return f"{value * factor:.4g} {shown}".rstrip()
+    """A number as people read it: lengths in mm, areas in mm², angles in degrees, without digits that mean nothing."""
+    factor, shown, digits = SHOWN.get(unit, (1.0, unit, 3))
+    return f"{round(value * factor, digits) + 0.0:.10g} {shown}".rstrip()
 
 
 def describe(entry: Entry) -> str:

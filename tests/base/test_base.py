@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handey_studio.base import Ledger, frozen_array, rejected_counts
+from handey_studio.base import Entry, Ledger, describe, frozen_array, measured, rejected_counts
 from handey_studio.base.files import replace_file
 from handey_studio.world import Block
 
@@ -47,3 +47,17 @@ def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="disk full"):
         replace_file(path, b"new")
     assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["poses.json"]
+
+
+def test_numbers_are_read_in_millimetres_and_degrees():
+    assert measured(0.00125, "m") == "1.25 mm"
+    assert measured(-0.000003736, "m") == "0 mm"
+    assert measured(np.pi / 2, "rad") == "90 °"
+    assert measured(1.2e-4, "m²") == "120 mm²"
+    assert measured(2.5, "") == "2.5"
+
+
+def test_an_entry_reads_as_a_sentence():
+    entry = Entry(0, None, "reach", "IK branch 1", "the arm collides", -0.013, 0.001, "m", ("forearm_link", "table"))
+    assert describe(entry) == "the arm collides (forearm_link and table): -13 mm, limit 1 mm"
+    assert describe(Entry(1, None, "reach", "IK branch 2")) == ""

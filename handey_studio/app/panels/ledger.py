@@ -10,7 +10,7 @@ from handey_studio.app.commands import FilterLedger
 from handey_studio.app.palette import css
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_user, set_to
-from handey_studio.base import Entry, rejected_counts
+from handey_studio.base import Entry, describe, rejected_counts
 
 ALL_STAGES = "all stages"
 ONLY = ("all", "fell", "stood")
@@ -105,7 +105,7 @@ def _row(entry: Entry, known: dict[int, Entry]) -> str:
     mark = f'<span style="color:{css(colour)};display:inline-block;width:18px">{sign}</span>'
     owner = html.esc(context(entry, known))
     below = [f'<div style="color:#97a1ad;padding-left:18px">{owner}</div>'] if owner else []
-    below += [f'<div style="color:#6b7684;padding-left:18px">{html.esc(_reason(entry))}</div>'] if fell else []
+    below += [f'<div style="color:#6b7684;padding-left:18px">{html.esc(describe(entry))}</div>'] if fell else []
     return f'<div style="padding:2px 0;border-bottom:1px solid #eef1f4">{mark}{html.esc(entry.option)}{"".join(below)}</div>'
 
 
@@ -116,15 +116,6 @@ def context(entry: Entry, known: dict[int, Entry]) -> str:
         entry = known[entry.parent]
         names.append(entry.option)
     return " › ".join(names[-2::-1])
-
-
-def _reason(entry: Entry) -> str:
-    words = entry.reason or ""
-    if entry.value is not None:
-        words += f": {html.number(entry.value, entry.unit)}"
-        if entry.limit is not None:
-            words += f", limit {html.number(entry.limit, entry.unit)}"
-    return words + (f" ({' – '.join(entry.bodies)})" if entry.bodies else "")
 
 
 def _text(entry: Entry) -> str:
