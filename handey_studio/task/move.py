@@ -13,7 +13,7 @@ from handey_studio.base.errors import unknown_name
 from handey_studio.task.destination import base_name, goal_poses, parse_destination
 from handey_studio.task.grasp_search import grasps_of
 from handey_studio.task.legs import Start, complete
-from handey_studio.task.options import Goal, check_goal, list_options
+from handey_studio.task.options import Goal, Option, check_goal, list_options
 from handey_studio.task.plan import MoveCommand, MoveResult
 from handey_studio.world import Part, PlacedPart, World
 
@@ -50,12 +50,12 @@ def plan_move(
     plan, reason = None, _goal_reason(world, command, ledger) if not goals else ""
     if goals:
         with _timed(timing, "options"):
-            tries = list_options(goals, ledger)
-        for count, option in enumerate(tries[: options.max_groups]):
+            tries = _within(list_options(goals, ledger), options.max_groups, ledger)
+        for count, option in enumerate(tries):
             if progress.cancelled:
                 reason = "cancelled"
                 break
-            part = Share(progress, count / min(len(tries), options.max_groups), (count + 1) / min(len(tries), options.max_groups))
+            part = Share(progress, count / len(tries), (count + 1) / len(tries))
             part.report(0.0, f"grasp group {count + 1} of {len(tries)}: {option.group.name}")
             entry = ledger.add("grasp group", option.name, parent=option.goal.entry)
             with _timed(timing, "grasp"):
@@ -80,6 +80,13 @@ def plan_move(
         ledger=ledger.entries,
         timing_s=timing,
     )
+
+
+def _within(tries: list[Option], limit: int, ledger: Ledger) -> list[Option]:
+    """The best `limit` options; that there are more is in the ledger."""
+    if len(tries) > limit:
+        ledger.add("options", f"{len(tries) - limit} more grasp groups", "not looked at: over the limit", value=len(tries), limit=limit)
+    return tries[:limit]
 
 
 def _goals(world: World, command: MoveCommand, parts: dict[str, Part], ledger: Ledger) -> list[Goal]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from handey_studio.base import BadInput, Ledger, Progress, Share, Silent, Value, frozen_array
 from handey_studio.cell.protocol import CannotAct, Cell
 from handey_studio.cell.workcell import Workcell
+from handey_studio.localization import LocateOptions
 from handey_studio.task.execute import execute
 from handey_studio.task.legs import Start
 from handey_studio.task.move import MoveOptions, check_command, plan_move
@@ -38,7 +39,8 @@ def sense(station: Station, cell: Cell, seed: int = 0, progress: Progress = Sile
     begun = time.perf_counter()
     depth_map = cell.scan()
     scanned = time.perf_counter() - begun
-    scene = understand(depth_map, station.parts, np.random.default_rng(seed), progress=Share(progress, 0.3, 1.0))
+    options = LocateOptions(table_z_m=station.workcell.table_z)
+    scene = understand(depth_map, station.parts, np.random.default_rng(seed), options, Share(progress, 0.3, 1.0))
     return replace(scene, timing_s={"scan": scanned} | scene.timing_s)
 
 

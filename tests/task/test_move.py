@@ -131,6 +131,15 @@ def test_a_move_that_needs_a_regrasp_fails_saying_so(figure1):
     assert result.status == "failed" and "needs a regrasp" in result.reason
 
 
+def test_a_limit_on_the_options_is_in_the_ledger(figure1):
+    cell = figure1.cell
+    to = MoveCommand("l_block", "0.45,0.33,0,90,0,0")
+    result = plan_in(figure1.station, figure1.scene, to, cell.joints(), cell.opening(), MoveOptions(max_groups=1))
+    (cut,) = [entry for entry in result.ledger if entry.stage == "options"]
+    assert cut.reason == "not looked at: over the limit" and cut.limit == 1 and cut.value is not None and cut.value > 100
+    assert sum(entry.stage == "grasp group" for entry in result.ledger) == 1
+
+
 def test_a_part_that_is_not_there_is_not_found(figure1):
     from handey_studio.task import Station
 
