@@ -17,6 +17,23 @@ from handey_studio.localization.verify import GRAZING, ON, _dot, edge_state, fac
 from handey_studio.sensing.depth_view import DepthView
 
 TAPERING = 0.5  # limits shrink to this share over the iterations
+MAX_TURN = 0.2  # rad in one step
+
+
+class Refined(NamedTuple):
+    """Poses `R` (n, 3, 3), `t` (n, 3) where the view agrees best; the `margin` (n,) [m] that the sensor lost at silhouettes;
+    `rms` (n,) [m] of readings off their faces; `covariance` (n, 6, 6) of a small turn [rad]
+    about the sensor's axes at the part's origin, and shift [m]."""
+
+    R: NDArray
+    t: NDArray
+    margin: NDArray
+    rms: NDArray
+    covariance: NDArray
+
+    def rows(self, chosen: NDArray) -> "Refined":
+        """Some of the poses, by their numbers."""
+        return Refined(*(array[chosen] for array in self))
 
 
 class Weights(NamedTuple):
@@ -35,11 +52,9 @@ def weights_of(view: DepthView, pixel: float) -> Weights:
     )
 
 
-def refine(
-    R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, weights: Weights, iterations: int
-) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Poses R (n, 3, 3), t (n, 3) moved to where the view agrees best; their lost margins (n,) [m] and the rms (n,) [m] off faces."""
-    return _refine(np.array(R), np.array(t), samples, evidence, limits, weights, iterations)
+def refine(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, weights: Weights, iterations: int) -> Refined:
+    """Poses R (n, 3, 3), t (n, 3) moved to where the view agrees best, each until it stands still or `iterations` are done."""
+    return Refined(*_refine(np.array(R), np.array(t), samples, evidence, limits, weights, iterations))
 
 
 @njit(cache=True)
@@ -73,8 +88,8 @@ def _faces(R, t, samples, evidence, limits, sigma, A, g):
         cosine = facing(R, normal, x, y, z, evidence.camera)
         if cosine < GRAZING:
             continue
-        seen, behind, j, i = reading_at(x, y, z, evidence, limits)
-        if seen != ON or evidence.taken[j, i]:
+        seen, behind = reading_at(x, y, z, evidence, limits)
+        if seen != ON:
             continue
         rz = ray_at(x, y, z, evidence.camera)[2]
         residual = -behind / rz * cosine  # of the reading from the face, along its outward normal
@@ -129,30 +144,41 @@ def _turned(R, w):
 
 
 @njit(cache=True)
+def _normal_equations(R, t, margin, samples, evidence, limits, weights):
+    """A (7, 7), g (7,) of one step, with the margin's expectation as an observation; sum of squares and count of the faces' readings."""
+    A, g = np.zeros((7, 7)), np.zeros(7)
+    squares, count = _faces(R, t, samples, evidence, limits, weights.face, A, g)
+    _outlines(R, t, margin, samples, evidence, limits, weights.edge, A, g)
+    strength = 40.0 / weights.margin_spread**2  # as good as a few dozen edge pixels
+    A[6, 6] += strength
+    g[6] += strength * (weights.margin - margin)
+    for r in range(7):
+        for c in range(r):
+            A[c, r] = A[r, c]
+        A[r, r] += 1e-6 * A[r, r] + 1e-3  # what nothing fixes stays where it is
+    return A, g, squares, count
+
+
+@njit(cache=True)
 def _refine(R, t, samples, evidence, limits, weights, iterations):
-    margins, rms = np.full(len(t), weights.margin), np.zeros(len(t))
+    margins, rms = np.full(len(t), weights.margin), np.full(len(t), np.inf)
+    covariance = np.zeros((len(t), 6, 6))
     for n in range(len(t)):
         for step in range(iterations):
             share = 1.0 - (1.0 - TAPERING) * step / max(iterations - 1, 1)
             tight = Limits(limits.agree, limits.hide, limits.through * share, limits.edge * share, limits.edge_depth, limits.edge)
-            A, g = np.zeros((7, 7)), np.zeros(7)
-            squares, count = _faces(R[n], t[n], samples, evidence, tight, weights.face, A, g)
-            _outlines(R[n], t[n], margins[n], samples, evidence, tight, weights.edge, A, g)
-            strength = 40.0 / weights.margin_spread**2  # as good as a few dozen edge pixels
-            A[6, 6] += strength
-            g[6] += strength * (weights.margin - margins[n])
-            rms[n] = np.sqrt(squares / count) if count else np.inf
+            A, g, squares, count = _normal_equations(R[n], t[n], margins[n], samples, evidence, tight, weights)
             if count < 6:
                 break
-            for r in range(7):
-                for c in range(r):
-                    A[c, r] = A[r, c]
-                A[r, r] += 1e-6 * A[r, r] + 1e-3
+            rms[n] = np.sqrt(squares / count)
+            if step == iterations - 1:
+                covariance[n] = np.linalg.inv(A)[:6, :6]
+                break
             delta = np.linalg.solve(A, g)
-            size = np.sqrt(delta[0] ** 2 + delta[1] ** 2 + delta[2] ** 2)
-            if size > 0.2:
-                delta *= 0.2 / size
+            turn = np.sqrt(delta[0] ** 2 + delta[1] ** 2 + delta[2] ** 2)
+            if turn > MAX_TURN:
+                delta *= MAX_TURN / turn
             R[n] = _turned(R[n], delta[:3])
             t[n] += delta[3:6]
             margins[n] = max(margins[n] + delta[6], 0.0)
-    return R, t, margins, rms
+    return R, t, margins, rms, covariance

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from handey_studio.localization.evidence import project
+from handey_studio.localization.evidence import Evidence, project
 
 
 def rendered_depth(corners_sensor: NDArray, triangles: NDArray, shape: tuple[int, int], camera: tuple[float, ...]) -> NDArray:
@@ -12,12 +12,40 @@ def rendered_depth(corners_sensor: NDArray, triangles: NDArray, shape: tuple[int
 
     Corners must lie in front of the sensor; triangles that do not are left out.
     """
-    return _draw(np.ascontiguousarray(corners_sensor), np.ascontiguousarray(triangles), shape[0], shape[1], camera)
+    out = np.full(shape, np.nan)
+    _draw(np.ascontiguousarray(corners_sensor), np.ascontiguousarray(triangles), camera, 0, 0, out)
+    return out
+
+
+def claimed_pixels(corners_sensor: NDArray, triangles: NDArray, evidence: Evidence, agree: float) -> NDArray:
+    """Numbers (k,), row by row, of the pixels whose readings lie within `agree` [m] of triangles drawn into the view."""
+    height, width = evidence.depth.shape
+    low, high = _window(np.ascontiguousarray(corners_sensor), evidence.camera)
+    u0, v0 = (int(np.clip(np.floor(low[k]), 0, side)) for k, side in ((0, width), (1, height)))
+    u1, v1 = (int(np.clip(np.ceil(high[k]) + 1, 0, side)) for k, side in ((0, width), (1, height)))
+    drawn = np.full((max(v1 - v0, 0), max(u1 - u0, 0)), np.nan)
+    _draw(np.ascontiguousarray(corners_sensor), np.ascontiguousarray(triangles), evidence.camera, u0, v0, drawn)
+    with np.errstate(invalid="ignore"):
+        v, u = np.nonzero(np.abs(evidence.depth[v0:v1, u0:u1] - drawn) < agree)
+    return (v + v0) * width + u + u0
 
 
 @njit(cache=True)
-def _draw(corners, triangles, height, width, camera):
-    out = np.full((height, width), np.nan)
+def _window(corners, camera):
+    """Least and greatest (u, v) [px] of corners in front of the sensor."""
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for n in range(len(corners)):
+        if camera[0] > 0.5 or corners[n, 2] > 1e-6:
+            u, v = project(corners[n, 0], corners[n, 1], corners[n, 2], camera)
+            low[0], low[1] = min(low[0], u), min(low[1], v)
+            high[0], high[1] = max(high[0], u), max(high[1], v)
+    return np.maximum(low, -1e6), np.minimum(high, 1e6)
+
+
+@njit(cache=True)
+def _draw(corners, triangles, camera, u0, v0, out):
+    """Draws triangles into `out` (H, W), whose first pixel is (u0, v0) of the view; the nearest surface stays."""
+    height, width = out.shape
     parallel = camera[0] > 0.5
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
     for n in range(len(triangles)):
@@ -26,6 +54,7 @@ def _draw(corners, triangles, height, width, camera):
             x, y, z = corners[triangles[n, k]]
             ahead = ahead and (parallel or z > 1e-6)
             u[k], v[k] = project(x, y, z, camera)
+            u[k], v[k] = u[k] - u0, v[k] - v0
             w[k] = z if parallel else 1.0 / z  # linear over the image
         area = (u[1] - u[0]) * (v[2] - v[0]) - (u[2] - u[0]) * (v[1] - v[0])
         if not ahead or abs(area) < 1e-12:
@@ -40,4 +69,3 @@ def _draw(corners, triangles, height, width, camera):
                 z = value if parallel else 1.0 / value
                 if not out[j, i] <= z:
                     out[j, i] = z
-    return out

@@ -11,17 +11,14 @@ from handey_studio.localization.segments import DataEdge
 
 @dataclass(frozen=True)
 class LocateOptions:
-    """`max_poses` instances of a part are looked for. A pose is accepted with at least `min_score`, at least
-    `min_edge_share` of its visible edges found, at least `min_surface_share` of what is not hidden on the readings, and at least
-    `min_visible_fraction` of the faces turned to the sensor seen. Data edges shorter than `min_edge_m` [m] are left out
-    (None: by the part's size). `max_hypotheses` are verified and the best `max_refined` refined. `table_z_m` is the
+    """`max_poses` instances of a part are looked for. A pose is accepted if it is right with a probability of at least `min_score`
+    and at least `min_visible_fraction` of the faces turned to the sensor is seen. Data edges shorter than `min_edge_m` [m] are left
+    out (None: by the view's pixels). `max_hypotheses` are verified and the best `max_refined` refined. `table_z_m` is the
     height [m] below which no part can be (None: no such plane)."""
 
     max_poses: int = 5
-    min_score: float = 0.8
-    min_edge_share: float = 0.7
-    min_surface_share: float = 0.93
-    min_visible_fraction: float = 0.12
+    min_score: float = 0.5
+    min_visible_fraction: float = 0.1
     min_edge_m: float | None = None
     max_data_edges: int = 120
     max_hypotheses: int = 40000
@@ -31,9 +28,10 @@ class LocateOptions:
 
 @dataclass(frozen=True, eq=False)
 class LocatedPose(Value):
-    """A part found. Transforms (4, 4); `score` in [0, 1] is the share of its visible edges found times the share of its
-    surface that agrees with the readings; `visible_fraction` of the faces turned to the sensor is seen; `surface_rms_m` [m] how far
-    readings lie off them; `margin_m` [m] what the sensor lost at silhouettes."""
+    """A part found. Transforms (4, 4); `score` in [0, 1] is the probability that it is right;
+    `visible_fraction` of the faces turned to the sensor is seen; `surface_rms_m` [m] how far
+    readings lie off them; `margin_m` [m] what the sensor lost at silhouettes, `sigma_m` [m] the standard deviation of its
+    loosest point."""
 
     part: str
     T_world_part: NDArray
@@ -44,6 +42,7 @@ class LocatedPose(Value):
     visible_fraction: float
     surface_rms_m: float
     margin_m: float = 0.0
+    sigma_m: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_part", frozen_array(self.T_world_part))
@@ -52,8 +51,8 @@ class LocatedPose(Value):
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis(Value):
-    """A pose that was weighed: from data edges `data` (their numbers), with what was found [m of edge]; `reason` says why it fell,
-    None if it was accepted."""
+    """A pose that was weighed: from data edges `data` assigned to model edges `model` (their numbers), its `score`, and what was
+    found and what was missing [m of edge]; `reason` says why it fell, None if it was accepted."""
 
     part: str
     T_world_part: NDArray
@@ -62,6 +61,7 @@ class Hypothesis(Value):
     missing_m: float
     data: tuple[int, ...]
     reason: str | None
+    model: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_part", frozen_array(self.T_world_part))

@@ -2,22 +2,21 @@
 
 import time
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from handey_studio.base import Ledger
 from handey_studio.localization.edges import edge_pixels
-from handey_studio.localization.evidence import Evidence, evidence_of
+from handey_studio.localization.evidence import Evidence, Limits, evidence_of, limits_of
+from handey_studio.localization.hypotheses import MatchTolerances, tolerances
+from handey_studio.localization.refine import Weights, weights_of
 from handey_studio.localization.result import LocateOptions
 from handey_studio.localization.segments import DataEdge, data_edges, link
 from handey_studio.localization.surface import surface_of
 from handey_studio.sensing.depth_view import DepthView
-from handey_studio.world.part import Part
 
+ROUGH = 1.8  # tolerances of poses straight from two edges, against those of refined ones
 MIN_EDGE_PX = 8.0
 STAGES = ("edges", "evidence", "hypothesize", "verify", "refine", "accept")
 TABLE_SHARE = 0.02  # of the readings that must lie at the table's height before the table is believed in
@@ -25,33 +24,23 @@ TABLE_SHARE = 0.02  # of the readings that must lie at the table's height before
 
 @dataclass(frozen=True)
 class Search:
-    """What one call looks at; `ledger`, `fell` and `timing` are what it writes down, `evidence.taken` what is explained."""
+    """What one call looks at, with limits for refined poses and `rough` ones; `ledger`, `fell` and `timing` are what it writes down."""
 
     view: DepthView
     evidence: Evidence
     edges: tuple[DataEdge, ...]
     options: LocateOptions
-    pixel: float
+    limits: Limits
+    rough: Limits
+    weights: Weights
+    tolerances: MatchTolerances
     table: bool
-    models: dict[str, Part]
     ledger: Ledger
     fell: Counter[str]
     timing: dict[str, float]
 
 
-class Candidate(NamedTuple):
-    """A refined pose of one part."""
-
-    part: Part
-    R: NDArray
-    t: NDArray
-    margin: float
-    rms: float
-    data: tuple[int, ...]
-    entry: int
-
-
-def look(view: DepthView, parts: Sequence[Part], options: LocateOptions) -> Search:
+def look(view: DepthView, options: LocateOptions) -> Search:
     """Edges and evidence of a view."""
     timing: dict[str, float] = dict.fromkeys(STAGES, 0.0)
     start = time.perf_counter()
@@ -66,8 +55,9 @@ def look(view: DepthView, parts: Sequence[Part], options: LocateOptions) -> Sear
     timing["evidence"] = time.perf_counter() - start
     ledger = Ledger()
     ledger.add("edges", f"{len(edges)} straight edges in the depth map", None if edges else "no straight edge found")
-    models = {part.name: part for part in parts}
-    return Search(view, evidence, edges, options, surface.pixel, _sees_table(view, options), models, ledger, Counter(), timing)
+    limits, rough, weights = limits_of(view), limits_of(view, ROUGH), weights_of(view, surface.pixel)
+    table = _sees_table(view, options)
+    return Search(view, evidence, edges, options, limits, rough, weights, tolerances(view), table, ledger, Counter(), timing)
 
 
 def _sees_table(view: DepthView, options: LocateOptions) -> bool:

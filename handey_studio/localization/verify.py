@@ -18,12 +18,14 @@ GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings t
 STEEP = 0.4  # cosine; a face seen more squarely than this should give readings
 UNREAD_COST = 0.3  # of a reading that sees through: no reading where there should be one
 ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but raggedly
+MIN_VISIBLE_SHARE = 0.2  # of an edge's samples that must be visible for the edge to be predicted
 MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the edge to count as found
 
 
 class Verdict(NamedTuple):
-    """What speaks for and against poses (n,): `found` and `missing` [m] of visible edge, `on`, `through` and `hidden`
-    [m²] of the faces that look at the sensor, `taken` [m²] of those lying on readings that another part explains."""
+    """What speaks for and against poses (n,): `found` and `missing` [m] of visible edge; of the faces that look at the sensor [m²]
+    those `on` readings, seen `through`, `hidden` behind nearer readings, and `unknown` where nothing was read; the number of
+    edges `predicted` to be seen and of those found, `edges`."""
 
     found: NDArray
     missing: NDArray
@@ -31,7 +33,12 @@ class Verdict(NamedTuple):
     through: NDArray
     hidden: NDArray
     unknown: NDArray
-    taken: NDArray
+    predicted: NDArray
+    edges: NDArray
+
+    def rows(self, chosen: NDArray) -> "Verdict":
+        """Those of some of the poses, by their numbers."""
+        return Verdict(*(array[chosen] for array in self))
 
     @property
     def edge_share(self) -> NDArray:
@@ -51,40 +58,29 @@ class Verdict(NamedTuple):
     @property
     def support(self) -> NDArray:
         """Rank [m]: found less missing edge, less what is seen through, as a length, times the shares that are right."""
-        balance = self.found - self.missing - 2.0 * np.sqrt(self.through) - 2.0 * np.sqrt(self.taken)
+        balance = self.found - self.missing - 2.0 * np.sqrt(self.through)
         return balance * np.where(balance > 0, self.edge_share * self.surface_share**2, 1.0)
 
 
 def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, every: int = 1) -> Verdict:
     """Verdicts on the poses R (n, 3, 3), t (n, 3) of the part in the sensor's frame, from every `every`-th sample."""
-    counts = _verify(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits, every) * every
-    return Verdict(*counts.T)
-
-
-def edge_tally(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits) -> tuple[int, int]:
-    """How many of the part's edges are predicted to be seen at one pose, and how many of them are found."""
-    states = _edge_states(R, t, samples, evidence, limits)
-    edges = int(samples.edge.max()) + 1
-    visible = np.bincount(samples.edge, states >= 0, edges)
-    found = np.bincount(samples.edge, states >= 1, edges)
-    total = np.bincount(samples.edge, minlength=edges)
-    predicted = (visible >= 2) & (visible >= 0.2 * total)
-    return int(predicted.sum()), int((predicted & (found >= MIN_EDGE_SHARE * visible)).sum())
+    counts = _verify(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits, every)
+    return Verdict(*(every * counts[:, :6]).T, *counts[:, 6:].T)
 
 
 @njit(cache=True)
 def reading_at(x, y, z, evidence, limits):
-    """How the reading at a point's pixel stands to it (ON, HIDDEN, THROUGH, UNKNOWN), how far behind it [m], and its pixel."""
+    """How the reading at a point's pixel stands to it (ON, HIDDEN, THROUGH, UNKNOWN), and how far behind it [m]."""
     u, v = project(x, y, z, evidence.camera)
     i, j = int(np.rint(u)), int(np.rint(v))
     if z <= 0.0 or i < 0 or j < 0 or i >= evidence.depth.shape[1] or j >= evidence.depth.shape[0]:
-        return UNKNOWN, 0.0, 0, 0
+        return UNKNOWN, 0.0
     behind = evidence.depth[j, i] - z
     if np.isnan(behind):
-        return UNKNOWN, 0.0, j, i
+        return UNKNOWN, 0.0
     if behind < -limits.hide:
-        return HIDDEN, behind, j, i
-    return (THROUGH if behind > limits.through else ON), behind, j, i
+        return HIDDEN, behind
+    return (THROUGH if behind > limits.through else ON), behind
 
 
 @njit(cache=True)
@@ -140,37 +136,46 @@ def edge_state(R, t, k, samples, evidence, limits):
 
 
 @njit(cache=True)
-def _edge_states(R, t, samples, evidence, limits):
-    states = np.empty(len(samples.edge), dtype=np.int64)
-    for k in range(len(states)):
-        states[k] = edge_state(R, t, k, samples, evidence, limits)[0]
-    return states
+def _edges(R, t, samples, evidence, limits, offset, every, out):
+    """Adds metres found and missing, and the edges predicted and found, of one pose."""
+    visible = found = samples_of_edge = 0
+    for k in range(offset, len(samples.edge), every):
+        state, _ = edge_state(R, t, k, samples, evidence, limits)
+        weight = samples.edge_weight[k]
+        if state == 2:
+            out[0] += ENDS_WORTH * weight
+        elif state >= 0:
+            out[1 - state] += weight
+        visible, found, samples_of_edge = visible + (state >= 0), found + (state >= 1), samples_of_edge + 1
+        if k + every >= len(samples.edge) or samples.edge[k + every] != samples.edge[k]:
+            if visible >= 2 and visible >= MIN_VISIBLE_SHARE * samples_of_edge:
+                out[6] += 1.0
+                out[7] += found >= MIN_EDGE_SHARE * visible
+            visible = found = samples_of_edge = 0
+
+
+@njit(cache=True)
+def _surfaces(R, t, samples, evidence, limits, offset, every, out):
+    """Adds the square metres on readings, seen through, hidden and without a reading, of one pose."""
+    for k in range(offset, len(samples.face_weight), every):
+        p = samples.face_point[k]
+        x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
+        cosine = facing(R, samples.face_normal[k], x, y, z, evidence.camera)
+        if cosine < GRAZING:
+            continue
+        seen, _ = reading_at(x, y, z, evidence, limits)
+        rim = samples.face_rim[k] * cosine < limits.edge + 0.5 * evidence.pixel
+        if rim and seen in (THROUGH, UNKNOWN):
+            continue  # the margin that sensors lose at silhouettes
+        if seen == UNKNOWN and cosine < STEEP:
+            seen = HIDDEN  # too steep to blame the part for the missing reading
+        out[2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += samples.face_weight[k]
 
 
 @njit(cache=True)
 def _verify(R, t, samples, evidence, limits, every):
-    out = np.zeros((len(t), 7))
+    out = np.zeros((len(t), 8))
     for n in range(len(t)):
-        for k in range(n % every, len(samples.edge), every):
-            state, _ = edge_state(R[n], t[n], k, samples, evidence, limits)
-            if state == 2:
-                out[n, 0] += ENDS_WORTH * samples.edge_weight[k]
-            elif state >= 0:
-                out[n, 1 - state] += samples.edge_weight[k]
-        for k in range(n % every, len(samples.face_weight), every):
-            p = samples.face_point[k]
-            x, y, z = _dot(R[n], 0, p) + t[n, 0], _dot(R[n], 1, p) + t[n, 1], _dot(R[n], 2, p) + t[n, 2]
-            cosine = facing(R[n], samples.face_normal[k], x, y, z, evidence.camera)
-            if cosine < GRAZING:
-                continue
-            seen, _, j, i = reading_at(x, y, z, evidence, limits)
-            rim = samples.face_rim[k] * cosine < limits.edge + 0.5 * evidence.pixel
-            if rim and seen in (THROUGH, UNKNOWN):
-                continue  # the margin that sensors lose at silhouettes
-            if seen == UNKNOWN and cosine < STEEP:
-                seen = HIDDEN  # too steep to blame the part for the missing reading
-            weight = samples.face_weight[k]
-            out[n, 2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += weight
-            if seen == ON and evidence.taken[j, i]:
-                out[n, 6] += weight
+        _edges(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
+        _surfaces(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
     return out

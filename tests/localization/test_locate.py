@@ -106,7 +106,7 @@ def test_a_part_that_touches_a_neighbour_of_its_height_is_found():
     rng, part = np.random.default_rng(4), PARTS["l_block"]
     T = from_xyz_rpy((0.45, -0.03, 0.0), (0, 0, 0.35))
     neighbour = (box([0.04, 0.03, 0.04]), T @ from_xyz_rpy((-0.02, 0.02, 0.02)))
-    result = localize(map_from_above([(part.solid, T), neighbour], rng).view(), [part], LocateOptions(min_edge_share=0.6, min_score=0.6))
+    result = localize(map_from_above([(part.solid, T), neighbour], rng).view(), [part], LocateOptions(min_score=0.3))
     assert result.poses, result.reason
     assert error(T, result.poses[0].T_world_part, part)[1] < 0.8
 

@@ -76,8 +76,8 @@ def hand_made_edges() -> tuple[DataEdge, ...]:
 def hand_made_hypotheses() -> tuple[Hypothesis, ...]:
     """One that stood and one that fell."""
     aside = from_xyz_rpy((0.44, 0.06, 0.0))
-    fell = Hypothesis("brick", aside, 0.31, 0.05, 0.11, (0, 1), "too few edges found")
-    return (Hypothesis("l_block", T_START, 0.93, 0.20, 0.01, (0, 1), None), fell)
+    fell = Hypothesis("brick", aside, 0.31, 0.05, 0.11, (0, 1), "too few edges found", (2, 3))
+    return (Hypothesis("l_block", T_START, 0.93, 0.20, 0.01, (0, 1), None, (0, 3)), fell)
 
 
 def line(robot: Robot, kind, start, end, opening, T_hand_part=None, held=None) -> Step:
