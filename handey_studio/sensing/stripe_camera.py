@@ -1,0 +1,97 @@
+"""A camera that watches the laser's stripes: pinhole and lens, where it stands, and where its peaks lie in space."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from handey_studio.base import BadInput, Value, frozen_array
+from handey_studio.geometry.transforms import is_rigid, transform
+from handey_studio.sensing.depth_view import Pinhole
+
+LENS_COEFFICIENTS = (0, 4, 5, 8, 12, 14)  # how many OpenCV knows how to read
+LENS_TOLERANCE_PX = 0.1  # a pixel whose undistorted ray does not come back to it lies where the lens's polynomial folds over
+UNDISTORT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
+GRAZING_SINE = 0.02  # a ray that meets the laser's plane flatter than 1.1° says nothing about where
+
+
+@dataclass(frozen=True, eq=False)
+class StripeCamera(Value):
+    """A camera that watches the stripes. `T_range_camera` (4, 4) maps its optical frame to the range frame.
+
+    `aspect` is fy / fx; `centre_px` the principal point (cx, cy), the middle when None. `distortion` are OpenCV's lens
+    coefficients k1, k2, p1, p2[, k3, …]; none is a lens without distortion.
+    """
+
+    T_range_camera: NDArray
+    focal_px: float = 1500.0
+    width: int = 820
+    height: int = 720
+    aspect: float = 1.0
+    centre_px: tuple[float, float] | None = None
+    distortion: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_range_camera", frozen_array(self.T_range_camera))
+        if not is_rigid(self.T_range_camera):
+            raise BadInput("a range finder's camera needs a rigid 4×4 T_range_camera.")
+        if len(self.distortion) not in LENS_COEFFICIENTS:
+            raise BadInput(f"a camera's distortion has {len(self.distortion)} numbers; it takes one of {LENS_COEFFICIENTS}.")
+
+    @property
+    def projection(self) -> Pinhole:
+        """Its pinhole, without the lens."""
+        cx, cy = ((self.width - 1) / 2.0, (self.height - 1) / 2.0) if self.centre_px is None else self.centre_px
+        return Pinhole(self.focal_px, self.focal_px * self.aspect, cx, cy)
+
+    @property
+    def matrix(self) -> NDArray:
+        """OpenCV's camera matrix (3, 3)."""
+        view = self.projection
+        return np.array([[view.fx, 0.0, view.cx], [0.0, view.fy, view.cy], [0.0, 0.0, 1.0]])
+
+    def rays(self, uv: NDArray) -> NDArray:
+        """Directions (n, 3) of the optical frame, z = 1, through pixels (n, 2) of the photograph; NaN where the lens has no inverse."""
+        uv = np.asarray(uv, dtype=float)
+        if not any(self.distortion) or not len(uv):
+            return self.projection.unproject(uv, np.ones(len(uv)))
+        lens = np.array(self.distortion)
+        seen = np.ascontiguousarray(uv[:, None])
+        flat = cv2.undistortPointsIter(seen, self.matrix, lens, np.eye(3), np.eye(3), UNDISTORT).reshape(-1, 2)
+        rays = np.concatenate([flat, np.ones((len(flat), 1))], axis=1)
+        missed = np.abs(self.project(rays) - uv).max(axis=1)
+        rays[~(missed <= LENS_TOLERANCE_PX)] = np.nan
+        return rays
+
+    def project(self, points_camera: NDArray) -> NDArray:
+        """Pixels (n, 2) of the photograph at which points (n, 3) [m] of the optical frame, in front of the camera, are seen."""
+        if not any(self.distortion) or not len(points_camera):
+            return self.projection.project(points_camera)
+        points = np.ascontiguousarray(points_camera, dtype=float)[:, None]
+        return cv2.projectPoints(points, np.zeros(3), np.zeros(3), self.matrix, np.array(self.distortion))[0].reshape(-1, 2)
+
+
+def camera_looking_at(position: ArrayLike, target: ArrayLike) -> StripeCamera:
+    """A camera at a position (3,) of the range frame that looks at a target (3,), its rows along the range frame's x."""
+    forward = np.asarray(target, dtype=float) - np.asarray(position, dtype=float)
+    forward /= np.linalg.norm(forward)
+    right = np.array([1.0, 0.0, 0.0]) - forward[0] * forward
+    right /= np.linalg.norm(right)
+    return StripeCamera(transform(np.stack([right, np.cross(forward, right), forward], axis=1), position))
+
+
+def points_on_planes(camera: StripeCamera, uv: NDArray, planes: NDArray) -> NDArray:
+    """Points (n, 3) [m] of the range frame where the rays of peaks (n, 2) [px] meet laser planes (n, 4) or one (4,).
+
+    A plane (nx, ny, nz, d) holds the points p with n·p = d; n has length 1. NaN where the ray grazes its plane or meets it
+    behind the camera.
+    """
+    rays = camera.rays(uv) @ camera.T_range_camera[:3, :3].T
+    planes = np.broadcast_to(planes, (len(rays), 4))
+    origin = camera.T_range_camera[:3, 3]
+    across = np.einsum("ij,ij->i", planes[:, :3], rays)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (planes[:, 3] - planes[:, :3] @ origin) / across
+        good = (along > 0) & (np.abs(across) >= GRAZING_SINE * np.linalg.norm(rays, axis=1))
+    return origin + rays * np.where(good, along, np.nan)[:, None]
