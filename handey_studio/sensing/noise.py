@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from handey_studio.sensing.depth_view import Orthographic, Pinhole
 
-SMALL_PX, LARGE_PX = 7, 17  # sides of the windows
+SIDES_PX = (7, 11, 17)  # of the windows
 WINDOWS = 450  # of each size; more tell no more
 MIN_WINDOWS = 12
 MIN_FILLED = 0.5  # of a window's pixels
 BETTER_SHARE = 0.3  # this quantile of the windows' residuals is taken for the noise: a part of them holds more than one plane
-MAX_SHARED = 1.35  # how much larger than the large window's residuals the noise can be
-MAX_STEP = 1.5  # residuals that grow by more from the small window to the large one come from edges, but where even the best windows' do
-BEST_SHARE = 0.1
+BEST_SHARE = 0.1  # this one to compare windows of two sizes
+MAX_SHARED = 1.35  # how much larger than the largest windows' residuals the noise can be
 LEAST_M = 0.00015  # exact depth, as renderers make it, still has edges that are a pixel off
 MOST_M = 0.02
 UNKNOWN_SHARE = 0.002  # of the depth, where there is too little to measure: a depth camera's usual noise
@@ -49,17 +48,17 @@ def noise_of(depth: NDArray, projection: Pinhole | Orthographic, quantum: float 
     """The noise of a depth image with how it grows with depth; arguments as in `measured_noise`."""
     depth = np.ascontiguousarray(depth, dtype=float)
     pinhole = isinstance(projection, Pinhole)
-    small, large = (_windows(depth, side, pinhole) for side in (SMALL_PX, LARGE_PX))
-    usable = large if len(large) >= MIN_WINDOWS else small
+    windows = [_windows(depth, side, pinhole) for side in SIDES_PX]
+    usable = next((found for found in reversed(windows) if len(found) >= MIN_WINDOWS), windows[0])
     middle = _median_depth(depth)
     if len(usable) < MIN_WINDOWS:
         return Noise(float(np.clip(UNKNOWN_SHARE * abs(middle), 0.0005, 0.005)), 0.0, len(usable))
     growth = _growth(usable) if pinhole else 0.0
-    sigma = _better(usable, middle, growth)
-    if usable is large and len(small) >= MIN_WINDOWS:
-        local = _better(small, middle, growth)
-        sigma = min(sigma, max(MAX_STEP * local, _better(large, middle, growth, BEST_SHARE)))
-        sigma *= float(np.clip(sigma / max(local, 1e-9), 1.0, MAX_SHARED))
+    sigma = _quantile(usable, middle, growth, BETTER_SHARE)
+    if usable is windows[-1]:
+        local = _quantile(windows[0], middle, growth, BETTER_SHARE)
+        shared = _shared(windows, middle, growth)
+        sigma = min(sigma, shared * local) * min(shared, MAX_SHARED)
     return Noise(float(np.clip(sigma, max(LEAST_M, quantum / np.sqrt(12.0)), MOST_M)), growth, len(usable))
 
 
@@ -72,10 +71,20 @@ def _median_depth(depth: NDArray) -> float:
     return float(np.median(some)) if len(some) else 1.0
 
 
-def _better(windows: NDArray, middle: float, growth: float, share: float = BETTER_SHARE) -> float:
-    """The better windows' residual [m] at the depth `middle`."""
+def _quantile(windows: NDArray, middle: float, growth: float, share: float) -> float:
+    """The residual [m] at the depth `middle` that this share of the windows stays below."""
     scaled = windows[:, 1] * (middle / windows[:, 0]) ** growth if growth else windows[:, 1]
     return float(np.quantile(scaled, share))
+
+
+def _shared(windows: list[NDArray], middle: float, growth: float) -> float:
+    """How many times the best small windows' residuals are the best large windows', at least 1.
+
+    It is 1 for noise that neighbours do not share. Small parts spoil large windows too, but the middle ones less: a growth that
+    sets in late comes from edges.
+    """
+    small, medium, large = (max(_quantile(found, middle, growth, BEST_SHARE), 1e-9) for found in windows)
+    return max(1.0, min(large / small, (medium / small) ** 2))
 
 
 def _growth(windows: NDArray) -> float:

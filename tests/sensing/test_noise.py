@@ -16,7 +16,7 @@ KINECT = Pinhole(525.0, 525.0, 319.5, 239.5)
 ABOVE = Orthographic(0.001, 255.5, 255.5)
 
 
-def scene(rng, count=12, projection=KINECT):
+def scene(rng, count=12, projection: Pinhole | Orthographic = KINECT):
     eye = (rng.uniform(-0.4, 0.4), rng.uniform(-0.5, -0.2), 0.8)
     shape = (480, 640) if projection is KINECT else (512, 512)
     T = looking_at(eye, (0.0, 0.0, 0.0)) if projection is KINECT else looking_at((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
