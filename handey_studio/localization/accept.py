@@ -90,4 +90,5 @@ def _located(search: Search, candidate: Candidate) -> LocatedPose:
 def _hypothesis(search: Search, candidate: Candidate, reason: str | None) -> Hypothesis:
     T_world_part = search.view.T_world_sensor @ pose_matrix(candidate.R, candidate.t)
     found, missing = float(candidate.verdict.found[0]), float(candidate.verdict.missing[0])
-    return Hypothesis(candidate.part.name, T_world_part, score(search, candidate), found, missing, candidate.data, reason, candidate.model)
+    numbers = candidate.data, reason, candidate.model, candidate.entry
+    return Hypothesis(candidate.part.name, T_world_part, score(search, candidate), found, missing, *numbers)

@@ -12,20 +12,19 @@ from numpy.typing import NDArray
 from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.localization.edge_pair import EdgePair, edge_pair
-from handey_studio.localization.evidence import Evidence, Limits, limits_of
+from handey_studio.localization.evidence import Evidence, Limits
 from handey_studio.localization.pairs import model_edges
 from handey_studio.localization.render import rendered_depth
 from handey_studio.localization.result import LocateOptions
 from handey_studio.localization.samples import PartSamples, part_samples
-from handey_studio.localization.search import look
+from handey_studio.localization.search import Search, look
 from handey_studio.localization.segments import DataEdge
-from handey_studio.localization.verify import MIN_EDGE_SHARE, edge_state, verify
+from handey_studio.localization.verify import MIN_EDGE_SHARE, MIN_VISIBLE_SHARE, edge_state, verify
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world.part import Part
 
 FOUND, MISSING, HIDDEN = 0, 1, 2
 STATE_NAMES = ("found", "missing", "hidden")
-MIN_VISIBLE_SHARE = 0.2  # of an edge's samples that must be visible for the edge to be predicted
 MAX_READINGS = 12_000  # that go to the screen; of more, every few
 
 
@@ -78,15 +77,15 @@ def explain(
     T_sensor_part: NDArray,
     data: tuple[DataEdge, ...] = (),
     model: tuple[int, ...] = (),
-    evidence: Evidence | None = None,
+    search: Search | None = None,
 ) -> Explanation:
     """What a view says to a part at a pose (4, 4).
 
     `data` are the two data edges that the pose came from and `model` the numbers of the two edges in the table of model edges that
-    they were taken for, empty when not known. `evidence` of the same view, if it is at hand, saves the looking.
+    they were taken for, empty when not known. `search` of the same view, if it is at hand, saves the looking.
     """
-    evidence = evidence or look(view, (part,), LocateOptions()).evidence
-    samples, limits = part_samples(part), limits_of(view)
+    search = search or look(view, LocateOptions())
+    samples, evidence, limits = part_samples(part), search.evidence, search.limits
     R, t = np.ascontiguousarray(T_sensor_part[:3, :3]), np.ascontiguousarray(T_sensor_part[:3, 3])
     states = _edge_states(R, t, samples, evidence, limits)
     pieces, state, edge = _pieces(samples, _shown(states))

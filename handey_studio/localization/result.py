@@ -52,7 +52,8 @@ class LocatedPose(Value):
 @dataclass(frozen=True, eq=False)
 class Hypothesis(Value):
     """A pose that was weighed: from data edges `data` assigned to model edges `model` (their numbers), its `score`, and what was
-    found and what was missing [m of edge]; `reason` says why it fell, None if it was accepted."""
+    found and what was missing [m of edge]; `reason` says why it fell, None if it was accepted, and the ledger's entry number `entry`
+    by how much (-1: none)."""
 
     part: str
     T_world_part: NDArray
@@ -62,6 +63,7 @@ class Hypothesis(Value):
     data: tuple[int, ...]
     reason: str | None
     model: tuple[int, ...] = ()
+    entry: int = -1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_part", frozen_array(self.T_world_part))

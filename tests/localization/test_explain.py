@@ -13,7 +13,9 @@ from handey_studio.localization import LocateOptions
 from handey_studio.localization.edge_pair import edge_pair
 from handey_studio.localization.explain import FOUND, HIDDEN, MAX_READINGS, MISSING, explain
 from handey_studio.localization.pairs import model_edges
+from handey_studio.localization.samples import part_samples
 from handey_studio.localization.search import look
+from handey_studio.localization.verify import ENDS_WORTH, verify
 from handey_studio.world import Part
 from tests.localization.rendering import map_from_above
 
@@ -82,17 +84,30 @@ def test_distances_are_those_to_the_nearest_point_of_the_mesh(brick_view):
     assert (behind | ~inside)[clear].all(), "a reading inside the model lies behind its surface"
 
 
-def test_evidence_at_hand_gives_the_same_and_readings_are_bounded(brick_view):
-    evidence = look(brick_view, (BRICK,), LocateOptions()).evidence
+def test_a_look_at_hand_gives_the_same_and_readings_are_bounded(brick_view):
+    search = look(brick_view, LocateOptions())
     T = in_sensor(brick_view, STANDING)
-    assert explain(brick_view, BRICK, T, evidence=evidence) == explain(brick_view, BRICK, T)
+    assert explain(brick_view, BRICK, T, search=search) == explain(brick_view, BRICK, T)
     table = Part("table", box((0.39, 0.39, 0.02)))
-    said = explain(brick_view, table, in_sensor(brick_view, from_xyz_rpy((0.48, 0.0, -0.01))), evidence=evidence)
+    said = explain(brick_view, table, in_sensor(brick_view, from_xyz_rpy((0.48, 0.0, -0.01))), search=search)
     assert 0.5 * MAX_READINGS < len(said.distance) <= MAX_READINGS
 
 
+def test_edges_are_counted_and_measured_as_the_verifier_does(brick_view):
+    search, samples = look(brick_view, LocateOptions()), part_samples(BRICK)
+    for shift in ((0.0, 0.0, 0.0), (0.012, 0.0, 0.0), (0.03, 0.02, 0.002)):
+        T = in_sensor(brick_view, transform(translation=shift) @ STANDING)
+        said = explain(brick_view, BRICK, T, search=search)
+        verdict = verify(T[None, :3, :3], T[None, :3, 3], samples, search.evidence, search.limits)
+        assert said.edges[FOUND] == verdict.edges[0] and said.edges[FOUND] + said.edges[MISSING] == verdict.predicted[0]
+        found, missing, _ = said.lengths_m
+        assert found - (1.0 - ENDS_WORTH) * said.ragged_m == pytest.approx(verdict.found[0]) and missing == pytest.approx(
+            verdict.missing[0]
+        )
+
+
 def test_figure_3_of_data_edges_is_that_of_the_model_edges_they_come_from(brick_view):
-    edges = look(brick_view, (BRICK,), LocateOptions()).edges
+    edges = look(brick_view, LocateOptions()).edges
     T = in_sensor(brick_view, STANDING)
     table = model_edges(BRICK)
     middle = apply(T, table.middle)
