@@ -19,7 +19,8 @@ from handey_studio.world.part import Part
 SAME_SHARE = 0.04  # of a part's diameter: hypotheses nearer than this are one
 EVERY = 4  # samples that the first verification looks at: one in so many
 FIRST_STEPS, LAST_STEPS = 6, 7  # of refinement, with few samples over rough limits, and with all over tight ones
-WORTH_REFINING = 0.35  # of the best support: refined poses with less are not refined again
+MOST_A_PLACE = 8  # hypotheses refined of those whose middles lie together
+MOST_REFINED_AGAIN = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +64,7 @@ def candidates_of(search: Search, part: Part) -> list[Candidate]:
     start = time.perf_counter()
     verdict = verify(found.R, found.t, part_samples(part), search.evidence, search.rough, EVERY)
     order = np.argsort(-verdict.support, kind="stable")
-    kept = distinct(found.R, found.t, order, part, _apart(search, part), search.options.max_refined)
+    kept = distinct(found.R, found.t, order, part, _apart(search, part), search.options.max_refined, MOST_A_PLACE)
     search.timing["verify"] += time.perf_counter() - start
     start = time.perf_counter()
     refined, verdict, kept = _refined(search, part, found.R[kept], found.t[kept], kept)
@@ -93,7 +94,7 @@ def _hypotheses(search: Search, part: Part) -> Assignments:
     longest = 2.0 * float(edges.half.max()) + search.tolerances.reach
     numbers = np.array([i for i, edge in enumerate(search.edges) if edge.length <= longest][: search.options.max_data_edges], dtype=int)
     lines = data_lines(tuple(search.edges[i] for i in numbers))
-    found = hypothesize(edges, model_pairs(part), lines, data_pairs(lines), search.tolerances, search.options.max_hypotheses)
+    found = hypothesize(edges, model_pairs(part), lines, data_pairs(lines, part.solid.diameter + search.tolerances.reach), search.tolerances, search.options.max_hypotheses)
     search.fell.update({reason: int(n) for reason, n in zip(FELL, found.fell, strict=True) if n})
     return found._replace(data=numbers[found.data])
 
@@ -103,8 +104,7 @@ def _refined(search: Search, part: Part, R: NDArray, t: NDArray, numbers: NDArra
     samples, few = part_samples(part), thinned(part)
     first = refine(R, t, few, search.evidence, search.rough, search.weights, FIRST_STEPS)
     support = verify(first.R, first.t, few, search.evidence, search.rough).support
-    kept = distinct(first.R, first.t, np.argsort(-support, kind="stable"), part, _apart(search, part), len(t))
-    kept = kept[support[kept] >= WORTH_REFINING * support[kept].max()]
+    kept = distinct(first.R, first.t, np.argsort(-support, kind="stable"), part, _apart(search, part), MOST_REFINED_AGAIN, 3)
     last = refine(first.R[kept], first.t[kept], samples, search.evidence, search.limits, search.weights, LAST_STEPS)
     verdict = verify(last.R, last.t, samples, search.evidence, search.limits)
     best = distinct(last.R, last.t, np.argsort(-verdict.support, kind="stable"), part, _apart(search, part), len(kept))

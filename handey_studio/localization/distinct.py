@@ -7,10 +7,14 @@ from numpy.typing import NDArray
 from handey_studio.world.part import Part
 
 
-def distinct(R: NDArray, t: NDArray, order: NDArray, part: Part, apart: float, most: int) -> NDArray:
+PLACE_SHARE = 0.25  # of a part's diameter: poses whose middles are nearer than this are at one place
+
+
+def distinct(R: NDArray, t: NDArray, order: NDArray, part: Part, apart: float, most: int, most_a_place: int = 1000) -> NDArray:
     """Numbers of poses R (n, 3, 3), t (n, 3), in the given order, that differ from all earlier ones by more than `apart` [m]
-    at some point of the part; at most `most`."""
-    return _distinct(R, t, order, probe_points(part), apart, most)
+    at some point of the part; at most `most`, and at most `most_a_place` at one place, so that one instance in full view does not
+    crowd out those that are half hidden."""
+    return _distinct(R, t, order, probe_points(part), apart, most, PLACE_SHARE * part.solid.diameter, most_a_place)
 
 
 def displacement(T_a: NDArray, T_b: NDArray, part: Part) -> float:
@@ -29,16 +33,20 @@ def probe_points(part: Part) -> NDArray:
 
 
 @njit(cache=True)
-def _distinct(R, t, order, probes, apart, most):
+def _distinct(R, t, order, probes, apart, most, place, most_a_place):
     kept = np.empty(most, dtype=np.int64)
     images = np.empty((most, 4, 3))
     n = 0
     for number in order:
-        new = True
-        for s in range(len(probes)):
-            here = probes[s] @ R[number].T + t[number]
+        middle = probes[0, 0] @ R[number].T + t[number]
+        here = 0
+        for k in range(n):
+            here += np.sqrt(((images[k, 0] - middle) ** 2).sum()) < place
+        new = here < most_a_place
+        for s in range(len(probes) if new else 0):
+            image = probes[s] @ R[number].T + t[number]
             for k in range(n):
-                if np.sqrt(((images[k] - here) ** 2).sum(axis=1).max()) < apart:
+                if np.sqrt(((images[k] - image) ** 2).sum(axis=1).max()) < apart:
                     new = False
                     break
             if not new:

@@ -93,11 +93,22 @@ def data_lines(edges: tuple[DataEdge, ...]) -> DataLines:
     return DataLines(ends.mean(axis=1), direction, half, kind, flank, side)
 
 
-def data_pairs(lines: DataLines) -> Pairs:
-    """Every pair of data edges that are not parallel, long ones first."""
-    first, second = np.triu_indices(len(lines.half), 1)
+def data_pairs(lines: DataLines, reach: float) -> Pairs:
+    """Pairs of data edges that are not parallel and whose ends lie within `reach` [m] of one another, long ones first."""
+    first, second = _together(lines, reach)
     order = np.argsort(-np.minimum(lines.half[first], lines.half[second]), kind="stable")
     return _pairs(lines.middle, lines.direction, first[order], second[order])
+
+
+def _together(lines: DataLines, reach: float) -> tuple[NDArray, NDArray]:
+    """Numbers of two edges each, of which every end is within `reach` [m] of the other's ends: one part could hold both."""
+    first, second = np.triu_indices(len(lines.half), 1)
+    apart = np.zeros(len(first))
+    ends = [lines.middle + sign * lines.half[:, None] * lines.direction for sign in (-1.0, 1.0)]
+    for one in ends:
+        for other in ends:
+            apart = np.maximum(apart, np.linalg.norm(one[first] - other[second], axis=1))
+    return first[apart <= reach], second[apart <= reach]
 
 
 def _pairs(middle: NDArray, direction: NDArray, first: NDArray, second: NDArray) -> Pairs:
