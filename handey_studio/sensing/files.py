@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from handey_studio.base import BadInput, Value
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.sensing.depth_view import DepthView, Pinhole
+from handey_studio.sensing.noise import measured_noise
+from handey_studio.sensing.outlines import measured_outline_error
 
 MAX_SIDE_PX = 4096
 MAX_DEPTH_BYTES = 420_000_000  # a cloud of 4096 × 4096 points of three float64 numbers, and its header
@@ -20,7 +22,6 @@ MAX_CAMERA_BYTES = 1_000_000
 MAX_DEPTH_M = 100.0
 PINHOLE_RMS_PX = 1.0  # an organised cloud whose points miss the best pinhole's pixels by more is no single image
 MIN_READINGS = 100
-RELATIVE_NOISE = 0.002  # depth cameras: 1.5 mm at 0.7 m
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,18 +47,19 @@ def read_depth(depth_path: str | os.PathLike, camera_path: str | os.PathLike | N
     if path.suffix.lower() == ".png":
         if camera is None:
             raise BadInput(f'depth image "{path}" needs a camera file with fx, fy, cx, cy and depth_scale.')
-        depth = _read_png(path, _number(camera, "depth_scale", low=1e-6, high=1e4))
+        scale = _number(camera, "depth_scale", low=1e-6, high=1e4)
+        depth, quantum = _read_png(path, scale), 1e-3 * scale
         pinhole = _pinhole(camera)
     elif path.suffix.lower() == ".npy":
         points = _read_cloud(path)
-        depth = points[..., 2]
+        depth, quantum = points[..., 2], 0.0
         pinhole = _fit_pinhole(points, path) if camera is None else _pinhole(camera)
     else:
         raise BadInput(f'depth file "{path}" has the suffix "{path.suffix}"; it must be one of .png, .npy.')
-    return _reading(path, depth, pinhole, camera or {})
+    return _reading(path, depth, pinhole, camera or {}, quantum)
 
 
-def _reading(path: Path, depth: NDArray, pinhole: Pinhole, camera: dict[str, Any]) -> DepthReading:
+def _reading(path: Path, depth: NDArray, pinhole: Pinhole, camera: dict[str, Any], quantum: float) -> DepthReading:
     depth = np.where(np.isfinite(depth) & (depth > 0) & (depth <= MAX_DEPTH_M), depth, np.nan)
     readings = int(np.isfinite(depth).sum())
     if readings < MIN_READINGS:
@@ -69,8 +71,9 @@ def _reading(path: Path, depth: NDArray, pinhole: Pinhole, camera: dict[str, Any
             raise BadInput(f'depth file "{path}" is {depth.shape[1]} × {depth.shape[0]} px, but its camera says {key} {camera[key]}.')
     given = camera.get("T_world_sensor")
     T_world_sensor = np.eye(4) if given is None else _rigid(given)
-    noise = RELATIVE_NOISE * float(np.nanmedian(depth))
-    return DepthReading(DepthView(depth, pinhole, T_world_sensor, noise=float(np.clip(noise, 0.0005, 0.005))), given is not None)
+    noise = measured_noise(depth, pinhole, quantum)
+    outline = measured_outline_error(depth, pinhole, noise)
+    return DepthReading(DepthView(depth, pinhole, T_world_sensor, noise=noise, outline_error=outline), given is not None)
 
 
 def _check_size(path: Path, limit: int, kind: str) -> None:
