@@ -11,130 +11,185 @@ import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from handey_studio.base import Value, frozen_array
-from handey_studio.localization.surface import Surface
-from handey_studio.sensing.depth_view import DepthView, Pinhole
+from handey_studio.localization.surface import Camera, Noise, Surface, camera_of, reading_sigma, unproject
+from handey_studio.sensing.depth_view import DepthView
 
 NONE, JUMP, CONVEX, CONCAVE = 0, 1, 2, 3
 KIND_NAMES = ("none", "jump", "convex", "concave")
 MAX_GAP_PX = 40  # a hole wider than this hides whatever comes after it
 JUMP_SIGMAS = 5.0  # a jump stands out by this many sigmas of a reading
+WEAK = 0.6  # share of that which a jump may sink to along an edge
 CREASE_LOW, CREASE_HIGH = 0.28, 0.5  # rad; between the noise of normals and the bluntest edge that is looked for
+CREASE_SCALE = 1000.0  # turns [rad] as Canny's whole numbers
 
 
 @dataclass(frozen=True, eq=False)
 class EdgePixels(Value):
-    """`kind` (H, W) uint8: NONE, JUMP, CONVEX or CONCAVE. `outward` (H, W, 2) [px] points from a jump's nearer surface
-    to the farther one, zero elsewhere."""
+    """`kind` (H, W) uint8: NONE, JUMP, CONVEX or CONCAVE. `outward` (H, W, 2) int8 points along the image's axes from a
+    jump's nearer surface, whose edge it is, to the farther one."""
 
     kind: NDArray
     outward: NDArray
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kind", frozen_array(self.kind, np.uint8))
-        object.__setattr__(self, "outward", frozen_array(self.outward))
+        object.__setattr__(self, "outward", frozen_array(self.outward, np.int8))
 
 
 def edge_pixels(view: DepthView, surface: Surface) -> EdgePixels:
     """The edge pixels of a view."""
-    rays = view.projection.rays(surface.points)
-    facing = np.abs(np.einsum("...i,...i->...", surface.normals, rays))
-    sigma = view.noise * _noise_growth(view) / np.where(np.isfinite(facing), np.maximum(facing, 0.2), 1.0)
-    strength, outward = _jumps(view.depth, surface.slope, sigma, 0.15 * surface.pixel, MAX_GAP_PX)
-    jump = _hysteresis(strength > 0.6 * JUMP_SIGMAS, strength > JUMP_SIGMAS)
-    crease = _creases(surface, view.noise)
-    near_jump = cv2.dilate(jump.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    kind = np.where(near_jump, NONE, crease)
-    kind[jump] = JUMP
-    kind[np.isnan(view.depth)] = NONE  # an edge pixel is a point in space
-    return EdgePixels(kind, np.where(jump[..., None], outward, 0.0))
-
-
-def _noise_growth(view: DepthView) -> NDArray:
-    """How much noisier each reading is than the view's typical one: triangulated depth degrades with its square."""
-    if isinstance(view.projection, Pinhole) and np.isfinite(view.depth).any():
-        return np.maximum((view.depth / np.nanmedian(view.depth)) ** 2, 0.5)
-    return np.ones(view.depth.shape)
-
-
-def _hysteresis(weak: NDArray, strong: NDArray) -> NDArray:
-    """Connected weak pixels that hold a strong one."""
-    labels = np.zeros(weak.shape, dtype=np.int32)
-    ndimage.label(weak, structure=np.ones((3, 3)), output=labels)
-    keep = np.zeros(int(labels.max()) + 1, dtype=bool)
-    keep[np.unique(labels[strong & weak])] = True
-    keep[0] = False
-    return keep[labels]
+    camera, noise = camera_of(view.projection), (view.noise, surface.typical)
+    strength, outward = _jumps(np.asarray(view.depth), surface.slope, surface.normals, camera, noise, 0.15 * surface.pixel)
+    jump = _hysteresis(strength, WEAK * JUMP_SIGMAS, JUMP_SIGMAS)
+    kind = _creases(view, surface)
+    kind[cv2.dilate(jump, np.ones((3, 3), np.uint8)) > 0] = NONE
+    kind[jump > 0] = JUMP
+    for array in (kind, outward):
+        array.flags.writeable = False
+    return EdgePixels(kind, outward)
 
 
 @njit(cache=True)
-def _jumps(depth: NDArray, slope: NDArray, sigma: NDArray, per_px: float, max_gap: int) -> tuple[NDArray, NDArray]:
-    """How far the depth falls away beside each pixel, beyond its slope, in sigmas (H, W), and the directions to there.
-
-    Holes are crossed: at a silhouette the sensor has no readings where its light or its eye is shadowed. A hole that
-    is wider than `max_gap` counts as a jump that just stands out.
-    """
-    height, width = depth.shape
-    strength = np.zeros((height, width))
-    outward = np.zeros((height, width, 2))
+def _hysteresis(strength: NDArray, low: float, high: float) -> NDArray:
+    """(H, W) uint8: pixels above `low` that are connected to one that reaches `high`."""
+    height, width = strength.shape
+    kept = np.zeros((height, width), dtype=np.uint8)
+    stack = np.empty((height * width, 2), dtype=np.int32)
     for v in range(height):
         for u in range(width):
-            if np.isnan(depth[v, u]):
+            if strength[v, u] < high or kept[v, u]:
+                continue
+            kept[v, u] = 1
+            stack[0, 0], stack[0, 1] = v, u
+            n = 1
+            while n > 0:
+                n -= 1
+                j, i = stack[n]
+                for y in range(max(j - 1, 0), min(j + 2, height)):
+                    for x in range(max(i - 1, 0), min(i + 2, width)):
+                        if not kept[y, x] and strength[y, x] > low:
+                            kept[y, x] = 1
+                            stack[n, 0], stack[n, 1] = y, x
+                            n += 1
+    return kept
+
+
+@njit(cache=True)
+def _beyond(depth, v, u, dv, du):
+    """How many pixels on the next reading that way is: MAX_GAP_PX + 1 across a wider hole, 0 at the view's border."""
+    height, width = depth.shape
+    y, x = v, u
+    for k in range(1, MAX_GAP_PX + 1):
+        y, x = y + dv, x + du
+        if y < 0 or x < 0 or y >= height or x >= width:
+            return 0
+        if not np.isnan(depth[y, x]):
+            return k
+    return MAX_GAP_PX + 1 if 0 <= y + dv < height and 0 <= x + du < width else 0
+
+
+@njit(cache=True)
+def _jumps(depth: NDArray, slope: NDArray, normals: NDArray, camera: Camera, noise: Noise, per_px: float) -> tuple[NDArray, NDArray]:
+    """How far the depth falls away beside each pixel, beyond its slope, in sigmas (H, W), and the directions to there (H, W, 2).
+
+    Holes are crossed: at a silhouette the sensor has no readings where its light or its eye is shadowed. A hole that
+    is wider than MAX_GAP_PX counts as a jump that just stands out.
+    """
+    height, width = depth.shape
+    strength = np.zeros((height, width), dtype=np.float32)
+    outward = np.zeros((height, width, 2), dtype=np.int8)
+    steps = ((0, 1), (0, -1), (1, 0), (-1, 0))
+    for v in range(height):
+        for u in range(width):
+            d = depth[v, u]
+            if np.isnan(d):
                 continue
             gu, gv = slope[v, u, 0], slope[v, u, 1]
+            facing = 1.0
             if np.isnan(gu):
                 gu = gv = 0.0
-            for dv, du in ((0, 1), (0, -1), (1, 0), (-1, 0)):
-                k = 1
-                while k <= max_gap and 0 <= v + k * dv < height and 0 <= u + k * du < width and np.isnan(depth[v + k * dv, u + k * du]):
-                    k += 1
-                if not (0 <= v + k * dv < height and 0 <= u + k * du < width):
+            else:
+                x, y, z = unproject(u, v, d, camera)
+                facing = (
+                    normals[v, u, 2]
+                    if camera[0] > 0.5
+                    else (normals[v, u, 0] * x + normals[v, u, 1] * y + normals[v, u, 2] * z) / np.sqrt(x * x + y * y + z * z)
+                )
+            sigma = reading_sigma(d, camera, noise) / max(abs(facing), 0.2)
+            for dv, du in steps:
+                y, x = v + dv, u + du
+                beside = 0 <= y < height and 0 <= x < width and not np.isnan(depth[y, x])
+                k = 1 if beside else _beyond(depth, v, u, dv, du)
+                if k == 0:
                     continue
-                if k > max_gap:
-                    fall = JUMP_SIGMAS * sigma[v, u]
+                if k > MAX_GAP_PX:
+                    fall = JUMP_SIGMAS * sigma
                 else:
-                    fall = depth[v + k * dv, u + k * du] - depth[v, u] - k * (gu * du + gv * dv) - per_px * (k - 1)
-                if fall > 0.6 * JUMP_SIGMAS * sigma[v, u]:
-                    strength[v, u] = max(strength[v, u], fall / sigma[v, u])
+                    fall = depth[v + k * dv, u + k * du] - d - k * (gu * du + gv * dv) - per_px * (k - 1)
+                if fall > WEAK * JUMP_SIGMAS * sigma:
+                    strength[v, u] = max(strength[v, u], fall / sigma)
                     outward[v, u, 0] += du
                     outward[v, u, 1] += dv
     return strength, outward
 
 
-def _creases(surface: Surface, noise: float) -> NDArray:
-    """(H, W) NONE, CONVEX or CONCAVE: Canny's thinning and hysteresis over the turn of the normal."""
-    turn_u, bend_u, normal_u = _turn(surface, 1, noise)
-    turn_v, bend_v, normal_v = _turn(surface, 0, noise)
-    same_way = np.sign(np.einsum("...i,...i->...", normal_u, normal_v))
-    scale = 1000.0
-    dx = np.clip(scale * turn_u, 0, 32000).astype(np.int16)
-    dy = np.clip(scale * turn_v * np.where(same_way == 0, 1, same_way), -32000, 32000).astype(np.int16)
-    edges = cv2.Canny(dx, dy, scale * CREASE_LOW, scale * CREASE_HIGH, L2gradient=True) > 0
-    bend = np.where(turn_u >= turn_v, bend_u, bend_v)
-    return np.where(edges, np.where(bend > 0, CONVEX, CONCAVE), NONE)
+def _creases(view: DepthView, surface: Surface) -> NDArray:
+    """(H, W) uint8 NONE, CONVEX or CONCAVE: Canny's thinning and hysteresis over the turn of the normal."""
+    camera = camera_of(view.projection)
+    dx, dy, bend = _turns(np.asarray(view.depth), surface.normals, camera, surface.radius_px, 3.0 * view.noise)
+    edges = cv2.Canny(dx, dy, CREASE_SCALE * CREASE_LOW, CREASE_SCALE * CREASE_HIGH, L2gradient=True)
+    return edges & bend  # Canny marks with all bits
 
 
-def _turn(surface: Surface, axis: int, noise: float) -> tuple[NDArray, NDArray, NDArray]:
-    """Turn of the normal [rad] along one image axis, over the window's width; its sign of bending; and the change itself.
+@njit(cache=True, inline="always")
+def _change(normals, v1, u1, v2, u2):
+    """Change of the normal from one pixel to another, and its square: 0 where one has none."""
+    ex = normals[v2, u2, 0] - normals[v1, u1, 0]
+    ey = normals[v2, u2, 1] - normals[v1, u1, 1]
+    ez = normals[v2, u2, 2] - normals[v1, u1, 2]
+    squared = ex * ex + ey * ey + ez * ez
+    return (ex, ey, ez, squared) if squared > 0.0 else (ex, ey, ez, np.float32(0.0))
 
-    Only within one connected surface: the line between the two points must lie about level under the mean normal.
-    """
-    r = surface.radius_px
-    shape = surface.normals.shape
-    change = np.zeros(shape)
-    turn, bend = np.zeros(shape[:2]), np.zeros(shape[:2])
-    low, high, mid = (np.s_[: -2 * r], np.s_[2 * r :], np.s_[r:-r])
-    a, b, c = ((k,) if axis == 0 else (slice(None), k) for k in (low, high, mid))
-    n_a, n_b = surface.normals[a], surface.normals[b]
-    across = surface.points[b] - surface.points[a]
-    delta = n_b - n_a
-    size = np.linalg.norm(delta, axis=-1)
-    reach = np.linalg.norm(across, axis=-1)
-    level = np.abs(np.einsum("...i,...i->...", across, n_a + n_b)) / 2.0 < 3.0 * noise + 0.5 * size * reach
-    usable = level & np.isfinite(size)
-    turn[c] = np.where(usable, 2.0 * np.arcsin(np.clip(size / 2.0, 0, 1)), 0.0)
-    bend[c] = np.where(usable, np.einsum("...i,...i->...", delta, across), 0.0)
-    change[c] = np.where(usable[..., None], delta, 0.0)
-    return turn, bend, change
+
+@njit(cache=True)
+def _turn(depth, normals, camera, v1, u1, v2, u2, change, slack):
+    """Turn of the normal [rad] between two pixels and its sign of bending: zero unless they are on one connected surface, when
+    the line between the two points lies about level under the mean normal."""
+    ex, ey, ez, squared = change
+    if squared == 0.0:
+        return 0.0, 0.0
+    x1, y1, z1 = unproject(u1, v1, depth[v1, u1], camera)
+    x2, y2, z2 = unproject(u2, v2, depth[v2, u2], camera)
+    x, y, z = x2 - x1, y2 - y1, z2 - z1
+    a, b = normals[v1, u1], normals[v2, u2]
+    size = np.sqrt(squared)
+    level = abs(x * (a[0] + b[0]) + y * (a[1] + b[1]) + z * (a[2] + b[2])) / 2.0
+    if level >= slack + 0.5 * size * np.sqrt(x * x + y * y + z * z):
+        return 0.0, 0.0
+    return 2.0 * np.arcsin(min(size / 2.0, 1.0)), ex * x + ey * y + ez * z
+
+
+@njit(cache=True)
+def _turns(depth: NDArray, normals: NDArray, camera: Camera, r: int, slack: float) -> tuple[NDArray, NDArray, NDArray]:
+    """The turn of the normal over the window's width along u and along v (H, W) int16, of one sign where they go the same
+    way, and the kind of crease that it would be."""
+    height, width = depth.shape
+    dx, dy = np.zeros((height, width), dtype=np.int16), np.zeros((height, width), dtype=np.int16)
+    kind = np.zeros((height, width), dtype=np.uint8)
+    least = (0.5 * CREASE_LOW) ** 2  # of the two together: flatter is no crease, nor beside one
+    nothing = (np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(0.0))
+    for v in range(height):
+        for u in range(width):
+            e = _change(normals, v, u - r, v, u + r) if r <= u < width - r else nothing
+            f = _change(normals, v - r, u, v + r, u) if r <= v < height - r else nothing
+            if e[3] + f[3] < least:
+                continue
+            turn_u, bend_u = _turn(depth, normals, camera, v, u - r, v, u + r, e, slack)
+            turn_v, bend_v = _turn(depth, normals, camera, v - r, u, v + r, u, f, slack)
+            opposite = turn_u > 0.0 and turn_v > 0.0 and e[0] * f[0] + e[1] * f[1] + e[2] * f[2] < 0.0
+            dx[v, u] = int(CREASE_SCALE * turn_u)
+            dy[v, u] = int(CREASE_SCALE * (-turn_v if opposite else turn_v))
+            kind[v, u] = CONVEX if (bend_u if turn_u >= turn_v else bend_v) > 0.0 else CONCAVE
+    return dx, dy, kind

@@ -70,7 +70,7 @@ def evidence_of(view: DepthView, surface: Surface, linked: Linked) -> Evidence:
     pinhole = isinstance(p, Pinhole)
     camera = (0.0, p.fx, p.fy, p.cx, p.cy) if pinhole else (1.0, 1.0 / p.pixel, 1.0 / p.pixel, p.cx, p.cy)
     uv = np.stack([u, v], axis=1).astype(float)
-    points = surface.points[v, u]
+    points = view.projection.unproject(uv, view.depth[v, u])
     taken = np.zeros(view.depth.shape, dtype=bool)
     return Evidence(np.array(view.depth), taken, nearest, uv, points, linked.kind[members] == JUMP, camera, surface.pixel)
 

@@ -9,14 +9,15 @@ from scipy import ndimage
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.localization.edges import JUMP, KIND_NAMES, EdgePixels
-from handey_studio.localization.surface import Surface
+from handey_studio.localization.flanks import Seen
+from handey_studio.localization.lines import Line, crease, silhouette
+from handey_studio.localization.runs import MIN_PIXELS
+from handey_studio.localization.surface import Surface, camera_of
 from handey_studio.sensing.depth_view import DepthView
 
-MIN_PIXELS = 10
 MAX_TURN = np.deg2rad(30.0)  # a pixel's own direction against the segment's: pixel directions are rough
 SETTLED = 12  # pixels after which the line alone decides: at corners the pixels' own directions mix
 MAX_BENDS = 4  # rounds of cutting a segment in two
-TRIM = 2.5  # sigmas; two rounds of trimming take the corners' rounding off a segment
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +26,8 @@ class DataEdge(Value):
 
     `ends_sensor` and `ends_world` (2, 3) [m]. `normals_sensor` (k, 3) are those of the surfaces that meet at it and are
     seen, one at a jump, two at a crease; `inward_sensor` (k, 3) points from the edge into each of them. `rms` [m] is
-    how far its pixels lie off the line.
+    how far its pixels lie off the line; `offset_sigma` [m] and `angle_sigma` [rad] are the standard deviations of the
+    line's distance, at its middle, and of its angle from those of the true edge.
     """
 
     kind: str
@@ -35,6 +37,8 @@ class DataEdge(Value):
     inward_sensor: NDArray
     pixels: int
     rms: float
+    offset_sigma: float = 0.0
+    angle_sigma: float = 0.0
 
     def __post_init__(self) -> None:
         for key in ("ends_sensor", "ends_world", "normals_sensor", "inward_sensor"):
@@ -79,12 +83,32 @@ def link(view: DepthView, surface: Surface, edges: EdgePixels) -> Linked:
 
 def data_edges(view: DepthView, surface: Surface, edges: EdgePixels, linked: Linked, min_length: float) -> tuple[DataEdge, ...]:
     """Segments of at least `min_length` [m], fitted in space, longest first."""
+    seen = Seen(
+        np.array(view.depth),
+        np.array(surface.slope),
+        camera_of(view.projection),
+        (view.noise, surface.typical),
+        surface.radius_px,
+        view.outline_error,
+    )
     order = np.argsort(linked.segment, kind="stable")
     order = order[linked.segment[order] >= 0]
     cuts = np.nonzero(np.diff(linked.segment[order]))[0] + 1
     straight = [piece for members in np.split(order, cuts) if len(members) for piece in _unbent(view, surface, linked, members)]
-    found = [_fit(view, surface, edges, linked, members) for members in straight]
-    return tuple(sorted((edge for edge in found if edge is not None and edge.length >= min_length), key=lambda edge: -edge.length))
+    found = []
+    for members in straight:
+        kind = int(linked.kind[members[0]])
+        u, v = linked.u[members].astype(float), linked.v[members].astype(float)
+        line = silhouette(seen, np.array(edges.outward), u, v) if kind == JUMP else crease(seen, u, v)
+        if line.pixels:
+            found.append(_data_edge(view, kind, line))
+    return tuple(sorted((edge for edge in found if edge.length >= min_length), key=lambda edge: -edge.length))
+
+
+def _data_edge(view: DepthView, kind: int, line: Line) -> DataEdge:
+    ends_world = line.ends @ view.T_world_sensor[:3, :3].T + view.T_world_sensor[:3, 3]
+    normals, inward = line.normals[: line.flanks], line.inward[: line.flanks]
+    return DataEdge(KIND_NAMES[kind], line.ends, ends_world, normals, inward, line.pixels, line.rms, line.offset_sigma, line.angle_sigma)
 
 
 def _unbent(view: DepthView, surface: Surface, linked: Linked, members: NDArray, depth: int = 0) -> list[NDArray]:
@@ -96,7 +120,7 @@ def _unbent(view: DepthView, surface: Surface, linked: Linked, members: NDArray,
     order = np.argsort(u * spread[0] + v * spread[1], kind="stable")
     members = members[order]
     along = (u * spread[0] + v * spread[1])[order]
-    heights = ndimage.median_filter(surface.points[v[order], u[order], 2], size=7, mode="nearest")
+    heights = ndimage.median_filter(view.depth[v[order], u[order]], size=7, mode="nearest")
     ends = max(3, len(members) // 8)
     a, b = (np.array([along[part].mean(), heights[part].mean()]) for part in (slice(0, ends), slice(-ends, None)))
     chord = a[1] + (along - a[0]) * (b[1] - a[1]) / max(b[0] - a[0], 1e-9)
@@ -105,54 +129,6 @@ def _unbent(view: DepthView, surface: Surface, linked: Linked, members: NDArray,
     if off[cut] < 4.0 * view.noise + 0.25 * view.outline_error or not MIN_PIXELS <= cut < len(members) - MIN_PIXELS:
         return [members]
     return [piece for half in (members[:cut], members[cut:]) for piece in _unbent(view, surface, linked, half, depth + 1)]
-
-
-def _fit(view: DepthView, surface: Surface, edges: EdgePixels, linked: Linked, members: NDArray) -> DataEdge | None:
-    """A line in space through a segment's pixels, by trimmed total least squares; None when too little stays on it."""
-    kind = int(np.bincount(linked.kind[members]).argmax())
-    points = surface.points[linked.v[members], linked.u[members]]
-    keep = np.isfinite(points).all(axis=1)
-    for _ in range(3):
-        if keep.sum() < MIN_PIXELS:
-            return None
-        centre = points[keep].mean(axis=0)
-        direction = np.linalg.svd(points[keep] - centre, full_matrices=False)[2][0]
-        off = np.linalg.norm((points - centre) - ((points - centre) @ direction)[:, None] * direction, axis=1)
-        rms = float(np.sqrt(np.mean(off[keep] ** 2)))
-        keep = np.isfinite(off) & (off <= TRIM * max(rms, 0.3 * view.noise))
-    along = (points[keep] - centre) @ direction
-    ends = centre + np.array([along.min(), along.max()])[:, None] * direction
-    u, v = linked.u[members][keep], linked.v[members][keep]
-    normals, inward = _flanks(surface, edges, kind, u, v, direction)
-    ends_world = ends @ view.T_world_sensor[:3, :3].T + view.T_world_sensor[:3, 3]
-    return DataEdge(KIND_NAMES[kind], ends, ends_world, normals, inward, int(keep.sum()), rms)
-
-
-def _flanks(surface: Surface, edges: EdgePixels, kind: int, u: NDArray, v: NDArray, direction: NDArray) -> tuple[NDArray, NDArray]:
-    """Normals and inward directions (k, 3) of the surfaces that meet at an edge, from pixels beside it."""
-    if kind == JUMP:
-        sides = [-edges.outward[v, u].sum(axis=0)]
-    else:
-        spread = np.linalg.svd(np.c_[u - u.mean(), v - v.mean()], full_matrices=False)[2][1]
-        sides = [spread, -spread]
-    normals, inward = [], []
-    for side in sides:
-        step = np.rint(side / max(np.linalg.norm(side), 1e-9) * (1.0 if kind == JUMP else surface.radius_px + 1.0)).astype(int)
-        x = np.clip(u + step[0], 0, surface.points.shape[1] - 1)
-        y = np.clip(v + step[1], 0, surface.points.shape[0] - 1)
-        known = np.isfinite(surface.normals[y, x]).all(axis=1)
-        if not known.any():
-            continue
-        normal = np.median(surface.normals[y, x][known], axis=0)
-        towards = np.median((surface.points[y, x] - surface.points[v, u])[known], axis=0)
-        normal = normal - (normal @ direction) * direction  # the surface holds the edge
-        if np.linalg.norm(normal) < 0.5:
-            continue
-        normal /= np.linalg.norm(normal)
-        in_plane = np.cross(normal, direction)
-        normals.append(normal)
-        inward.append(in_plane if in_plane @ towards > 0 else -in_plane)
-    return np.array(normals).reshape(-1, 3), np.array(inward).reshape(-1, 3)
 
 
 @njit(cache=True)
