@@ -1,7 +1,7 @@
 """Photographs from a folder: PNG or JPEG, grey or colour, 8 or 16 bit, and the dark frame that belongs to each.
 
-The laser is off in a dark frame and all else is as it was. `NAME.dark.png` is the dark frame of `NAME.png`; a single
-`dark.png` is that of every photograph without its own.
+The laser is off in a dark frame and all else is as it was. `NAME.dark.png` is the dark frame of `NAME.png`,
+`CAMERA.dark.png` that of every photograph of a camera of that name, and `dark.png` that of all others.
 """
 
 from dataclasses import dataclass
@@ -52,9 +52,9 @@ def is_dark(path: Path) -> bool:
     return path.stem == DARK or path.stem.endswith(f".{DARK}")
 
 
-def dark_frame_of(path: Path, common: Path | None = None) -> Path | None:
-    """The dark frame of a photograph: its own, else `common`, else its folder's, else None."""
-    own = _with_stem(path.parent, f"{path.stem}.{DARK}")
+def dark_frame_of(path: Path, common: Path | None = None, camera: str = "") -> Path | None:
+    """The dark frame of a photograph: its own, else its camera's (by the camera's name), else `common`, else its folder's, else None."""
+    own = _with_stem(path.parent, f"{path.stem}.{DARK}") or (_with_stem(path.parent, f"{camera}.{DARK}") if camera else None)
     return own or common or _with_stem(path.parent, DARK)
 
 

@@ -98,7 +98,7 @@ def scan_folder(
     looks: list[Look] = []
     colours, directions, total = [], [], sum(map(len, groups))
     for camera, group in enumerate(groups):
-        darks = [dark_frame_of(path, dark) for path in group]
+        darks = [dark_frame_of(path, dark, instrument.names[camera]) for path in group]
         colour, direction = _how_it_looks(group, darks, options)
         colours.append(colour)
         directions.append(direction)

@@ -10,7 +10,7 @@ from handey_studio.base import BadInput, Value, frozen_array
 from handey_studio.geometry.transforms import is_rigid, transform
 from handey_studio.sensing.depth_view import Pinhole
 
-LENS_COEFFICIENTS = (0, 4, 5, 8, 12, 14)  # how many OpenCV knows how to read
+LENS_COEFFICIENTS = (0, 4, 5, 8, 12)  # OpenCV's lenses: radial and tangential, with k3, with k4–k6, with s1–s4
 LENS_TOLERANCE_PX = 0.1  # a pixel whose undistorted ray does not come back to it lies where the lens's polynomial folds over
 LENS_ROUNDS, LENS_ENOUGH_PX = 12, 1e-5
 GRAZING_SINE = 0.02  # a ray that meets the laser's plane flatter than 1.1° says nothing about where
@@ -70,10 +70,20 @@ class StripeCamera(Value):
 
     def project(self, points_camera: NDArray) -> NDArray:
         """Pixels (n, 2) of the photograph at which points (n, 3) [m] of the optical frame, in front of the camera, are seen."""
-        if not any(self.distortion) or not len(points_camera):
-            return self.projection.project(points_camera)
-        points = np.ascontiguousarray(points_camera, dtype=float)[:, None]
-        return cv2.projectPoints(points, np.zeros(3), np.zeros(3), self.matrix, np.array(self.distortion))[0].reshape(-1, 2)
+        if any(self.distortion):
+            points_camera = _through_lens(np.asarray(points_camera, dtype=float), self.distortion)
+        return self.projection.project(points_camera)
+
+
+def _through_lens(points: NDArray, distortion: tuple[float, ...]) -> NDArray:
+    """Directions (n, 3), z = 1, in which points (n, 3) are seen through a lens: Brown's model, as OpenCV orders it."""
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = (*distortion, *(0.0,) * (max(LENS_COEFFICIENTS) - len(distortion)))
+    x, y = points[:, 0] / points[:, 2], points[:, 1] / points[:, 2]
+    r2 = x * x + y * y
+    radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    bent_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + r2 * (s1 + r2 * s2)
+    bent_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y + r2 * (s3 + r2 * s4)
+    return np.stack([bent_x, bent_y, np.ones_like(x)], axis=1)
 
 
 def camera_looking_at(position: ArrayLike, target: ArrayLike) -> StripeCamera:
