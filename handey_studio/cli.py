@@ -64,10 +64,23 @@ def _parser() -> argparse.ArgumentParser:
     ):
         _move_arguments(command(name, run, text))
     bench = command("bench", _bench, "measure on many random scenes")
-    bench.add_argument("what", choices=("piles",), help="piles: one MOVE in each of many random piles")
-    bench.add_argument("--seeds", type=_seeds, default=range(20), help="FIRST:END of the seeds (default: 0:20)")
-    bench.add_argument("--json", type=Path, help="write the table here")
+    _bench_arguments(bench)
     return parser
+
+
+def _bench_arguments(bench: argparse.ArgumentParser) -> None:
+    bench.add_argument(
+        "what", choices=("piles", "locate"), help="piles: one MOVE in each of many random piles; locate: every part in many scenes"
+    )
+    bench.add_argument("--seeds", type=_seeds, help="FIRST:END of the seeds (default: 0:20)")
+    bench.add_argument("--json", type=Path, help="write the table here")
+    locate = bench.add_argument_group("bench locate")
+    locate.add_argument(
+        "--scenes", type=Path, help="folder of scenes, simulated or labelled real ones; with --seeds, where simulated ones are kept"
+    )
+    locate.add_argument("--peers", action="store_true", help="ask Open3D and OpenCV the same questions, as far as they are installed")
+    locate.add_argument("--peer-python", metavar="PYTHON", help="interpreter of the environment that holds the peers (default: this one)")
+    locate.add_argument("--plot", type=Path, help="draw recall, precision and time into a .png, .svg or .pdf")
 
 
 def _locate_arguments(locate: argparse.ArgumentParser) -> None:
@@ -205,13 +218,33 @@ class _Lines:
 
 
 def _bench(given: argparse.Namespace) -> int:
-    from handey_studio.task.bench import bench_piles
-
     _check_output(given.json)
-    report = bench_piles(given.seeds, Library.choose(given.library), tell=print)
+    report = _bench_piles(given) if given.what == "piles" else _bench_locate(given)
     if given.json:
         _write_json(given.json, report)
     return DONE
+
+
+def _bench_piles(given: argparse.Namespace) -> dict[str, Any]:
+    from handey_studio.task.bench import bench_piles
+
+    return bench_piles(given.seeds or range(20), Library.choose(given.library), tell=print)
+
+
+def _bench_locate(given: argparse.Namespace) -> dict[str, Any]:
+    from handey_studio.task.bench_locate import run_bench
+
+    _check_output(given.plot)
+    return run_bench(
+        Library.choose(given.library),
+        tell=lambda line: print(f"\r\033[K{line}" if sys.stderr.isatty() else line),
+        progress=_Lines(),
+        seeds=given.seeds,
+        scenes=given.scenes,
+        peers=given.peers,
+        peer_python=given.peer_python,
+        plot_to=given.plot,
+    )
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

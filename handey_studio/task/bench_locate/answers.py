@@ -1,0 +1,85 @@
+"""How each method answers "where is this part?": Handey Studio as a user calls it, and its peers."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Value, frozen_array
+from handey_studio.localization import LocateOptions, localize
+from handey_studio.sensing.support import support_plane
+from handey_studio.task.bench_locate.labelled_scenes import LabelledScene
+from handey_studio.world.part import Part
+
+OURS = "handey"
+MAX_POSES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Pose(Value):
+    """A reported pose (4, 4) with the method's own score."""
+
+    T_sensor_part: NDArray
+    score: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_sensor_part", frozen_array(self.T_sensor_part))
+
+
+@dataclass(frozen=True, eq=False)
+class Answer(Value):
+    """The poses that a method stands by, best first, and the seconds from the view in memory to the answer."""
+
+    poses: tuple[Pose, ...]
+    seconds: float
+    reason: str = ""
+
+
+class Method(Protocol):
+    """Something that locates parts."""
+
+    @property
+    def name(self) -> str: ...
+
+    def see(self, scene: LabelledScene) -> None:
+        """The scene that the following questions are about."""
+        ...
+
+    def locate(self, part: Part) -> Answer:
+        """Where a part is in the scene seen last."""
+        ...
+
+
+class Handey:
+    """One call of `localize` a part, with the support plane found first where the file does not tell where the sensor stands."""
+
+    name = OURS
+
+    def __init__(self) -> None:
+        self._scene: LabelledScene | None = None
+
+    def see(self, scene: LabelledScene) -> None:
+        self._scene = scene
+
+    def locate(self, part: Part) -> Answer:
+        assert self._scene is not None
+        begun = time.perf_counter()
+        view, options = self._scene.view, LocateOptions(max_poses=MAX_POSES)
+        rng = np.random.default_rng(0)
+        if not self._scene.knows_world:
+            support = support_plane(view, rng)
+            view = replace(view, T_world_sensor=support.T_world_sensor)
+            options = options if support.found else replace(options, table_z_m=None)
+        result = localize(view, (part,), options, rng)
+        seconds = time.perf_counter() - begun
+        return Answer(tuple(Pose(pose.T_sensor_part, pose.score) for pose in result.poses), seconds, result.reason)
+
+
+def warm_up(methods: Sequence[Method], scene: LabelledScene) -> None:
+    """One question that is not counted, so that nobody's compiling or loading is measured."""
+    for method in methods:
+        method.see(scene)
+        method.locate(scene.parts[0])

@@ -1,0 +1,47 @@
+"""What the command gathers: scenes from seeds or folders, Handey Studio and its peers, the table and the plot."""
+
+import tempfile
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from handey_studio.base import Progress
+from handey_studio.task.bench_locate.answers import Handey, Method
+from handey_studio.task.bench_locate.labelled_scenes import load_labelled, scene_folders, simulate
+from handey_studio.task.bench_locate.peers import Peer, PeerProcess
+from handey_studio.task.bench_locate.plot import check_plot, plot
+from handey_studio.task.bench_locate.run import bench_locate
+from handey_studio.world.library import Library
+
+SEEDS = range(20)
+
+
+def run_bench(
+    library: Library,
+    tell: Callable[[str], None],
+    progress: Progress,
+    *,
+    seeds: Iterable[int] | None = None,
+    scenes: Path | None = None,
+    peers: bool = False,
+    peer_python: str | None = None,
+    plot_to: Path | None = None,
+) -> dict[str, Any]:
+    """Measure and tell. Scenes are those in the folder `scenes`; with `seeds`, those seeds' simulated ones, made there if they are not yet;
+    without a folder they are made and forgotten. Raises BadInput, before any work where it can."""
+    check_plot(plot_to)
+    with ExitStack() as open_things:
+        methods: list[Method] = [Handey()]
+        if peers or peer_python is not None:
+            process = open_things.enter_context(PeerProcess(peer_python))
+            methods += [Peer(process, name) for name in process.names]
+        if scenes is not None and seeds is None:
+            folders = scene_folders(scenes)
+        else:
+            place = scenes or Path(open_things.enter_context(tempfile.TemporaryDirectory(prefix="handey-scenes-")))
+            folders = simulate(SEEDS if seeds is None else seeds, place, library, progress)
+        report = bench_locate(load_labelled(folders, library), methods, tell, progress, len(folders))
+    if plot_to is not None and report["rows"]:
+        plot(report["summary"], plot_to)
+    return report
