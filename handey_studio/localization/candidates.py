@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.localization.distinct import distinct, probe_points
-from handey_studio.localization.hypotheses import FELL, Assignments, hypothesize
-from handey_studio.localization.pairs import data_lines, data_pairs, model_edges, model_pairs
+from handey_studio.localization.hypotheses import FELL, Assignments, hypothesize, hypothesize_parallel, joined
+from handey_studio.localization.pairs import data_lines, data_pairs, data_parallels, model_edges, model_pairs, model_parallels
 from handey_studio.localization.refine import Refined, refine
 from handey_studio.localization.samples import PartSamples, part_samples, thinned
 from handey_studio.localization.search import Search
-from handey_studio.localization.verify import Verdict, verify
+from handey_studio.localization.verify import Verdict, unopposed, verify
 from handey_studio.world.part import Part
 
 SAME_SHARE = 0.04  # of a part's diameter: hypotheses nearer than this are one
 EVERY = 4  # samples that the first verification looks at: one in so many
-FIRST_STEPS, LAST_STEPS = 6, 7  # of refinement, with few samples over rough limits, and with all over tight ones
-MOST_A_PLACE = 8  # hypotheses refined of those whose middles lie together
-MOST_REFINED_AGAIN = 40
+FIRST_STEPS, LAST_STEPS = 4, 8  # of refinement, with few samples over rough limits, and with all over tight ones
+MOST_A_PLACE = 20  # hypotheses refined of those whose middles lie together
+MOST_REFINED_AGAIN = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +62,9 @@ def candidates_of(search: Search, part: Part) -> list[Candidate]:
     if not len(found.t):
         return []
     start = time.perf_counter()
+    possible = unopposed(found.R, found.t, part_samples(part), search.evidence, search.rough)
+    search.fell["the sensor sees through it"] += len(found.t) - len(possible)
+    found = found.rows(possible)
     verdict = verify(found.R, found.t, part_samples(part), search.evidence, search.rough, EVERY)
     order = np.argsort(-verdict.support, kind="stable")
     kept = distinct(found.R, found.t, order, part, _apart(search, part), search.options.max_refined, MOST_A_PLACE)
@@ -89,12 +92,15 @@ def _apart(search: Search, part: Part) -> float:
 
 
 def _hypotheses(search: Search, part: Part) -> Assignments:
-    """Transforms from the data edges that are not too long for the part; `data` holds their numbers among all edges."""
-    edges = model_edges(part)
-    longest = 2.0 * float(edges.half.max()) + search.tolerances.reach
+    """Transforms from pairs of the data edges that are not too long for the part; `data` holds their numbers among all edges."""
+    edges, limits, most = model_edges(part), search.tolerances, search.options.max_hypotheses
+    longest, reach = 2.0 * float(edges.half.max()) + limits.reach, part.solid.diameter + limits.reach
     numbers = np.array([i for i, edge in enumerate(search.edges) if edge.length <= longest][: search.options.max_data_edges], dtype=int)
     lines = data_lines(tuple(search.edges[i] for i in numbers))
-    found = hypothesize(edges, model_pairs(part), lines, data_pairs(lines, part.solid.diameter + search.tolerances.reach), search.tolerances, search.options.max_hypotheses)
+    found = joined(
+        hypothesize(edges, model_pairs(part), lines, data_pairs(lines, reach), limits, most),
+        hypothesize_parallel(edges, model_parallels(part), lines, data_parallels(lines, reach, limits.angle), limits, most),
+    )
     search.fell.update({reason: int(n) for reason, n in zip(FELL, found.fell, strict=True) if n})
     return found._replace(data=numbers[found.data])
 

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 
 from handey_studio.world.part import Part
 
-
 PLACE_SHARE = 0.25  # of a part's diameter: poses whose middles are nearer than this are at one place
 
 

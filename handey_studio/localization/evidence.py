@@ -1,4 +1,4 @@
-"""What the view offers to a verifier: readings, the nearest edge pixel of each direction, what is taken already."""
+"""What the view offers to a verifier: readings, the nearest edge pixel of each direction."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from handey_studio.localization.edges import JUMP
 from handey_studio.localization.segments import Linked
 from handey_studio.localization.surface import Surface
 from handey_studio.sensing.depth_view import DepthView, Pinhole
@@ -32,17 +31,16 @@ class Limits(NamedTuple):
 class Evidence(NamedTuple):
     """Arrays that the compiled verifier reads.
 
-    `depth` (H, W) [m]; `taken` (H, W) bool, explained by a part already; `nearest` (DIRECTIONS, H, W) number of the nearest
+    `depth` (H, W) [m]; `nearest` (DIRECTIONS, H, W) number of the nearest
     edge pixel whose direction is about that of the sector, −1 for none; `edge_uv` (n, 2) [px], `edge_point` (n, 3) [m],
-    `edge_jump` (n,) bool. `camera`: 1 if parallel, scale x, scale y, cx, cy, as in `project`; `pixel` [m].
+    `edge_kind` (n,) JUMP, CONVEX or CONCAVE. `camera`: 1 if parallel, scale x, scale y, cx, cy, as in `project`; `pixel` [m].
     """
 
     depth: NDArray
-    taken: NDArray
     nearest: NDArray
     edge_uv: NDArray
     edge_point: NDArray
-    edge_jump: NDArray
+    edge_kind: NDArray
     camera: tuple[float, float, float, float, float]
     pixel: float
 
@@ -71,8 +69,7 @@ def evidence_of(view: DepthView, surface: Surface, linked: Linked) -> Evidence:
     camera = (0.0, p.fx, p.fy, p.cx, p.cy) if pinhole else (1.0, 1.0 / p.pixel, 1.0 / p.pixel, p.cx, p.cy)
     uv = np.stack([u, v], axis=1).astype(float)
     points = view.projection.unproject(uv, view.depth[v, u])
-    taken = np.zeros(view.depth.shape, dtype=bool)
-    return Evidence(np.array(view.depth), taken, nearest, uv, points, linked.kind[members] == JUMP, camera, surface.pixel)
+    return Evidence(np.array(view.depth), nearest, uv, points, linked.kind[members], camera, surface.pixel)
 
 
 def _nearest(shape: tuple[int, ...], u: NDArray, v: NDArray, numbers: NDArray) -> NDArray:

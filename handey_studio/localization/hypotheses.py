@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.edges import CONVEX
-from handey_studio.localization.pairs import DataLines, ModelEdges, Pairs
+from handey_studio.localization.pairs import DataLines, ModelEdges, Pairs, ParallelPairs
 from handey_studio.sensing.depth_view import DepthView
 
 
@@ -32,6 +32,10 @@ class Assignments(NamedTuple):
     tried: int
     fell: NDArray
 
+    def rows(self, chosen: NDArray) -> "Assignments":
+        """Some of the transforms, by their numbers."""
+        return Assignments(*(array[chosen] for array in self[:4]), self.tried, self.fell)
+
 
 FELL = (
     "angle α differs",
@@ -51,6 +55,21 @@ def hypothesize(edges: ModelEdges, table: Pairs, lines: DataLines, pairs: Pairs,
     """At most four transforms for each consistent assignment of a data pair to a model pair; the first `most` of them."""
     R, t, numbers, tried, fell = _match(edges, table, lines, pairs, limits, most)
     return Assignments(R, t, numbers[:, :2], numbers[:, 2:], int(tried), fell)
+
+
+def hypothesize_parallel(
+    edges: ModelEdges, table: ParallelPairs, lines: DataLines, pairs: ParallelPairs, limits: MatchTolerances, most: int
+) -> Assignments:
+    """The same for parallel edges, which fix a transform but for its slide along them: an end of a data edge is laid on the
+    end of its model edge."""
+    R, t, numbers, tried, fell = _match_parallel(edges, table, lines, pairs, limits, most)
+    return Assignments(R, t, numbers[:, :2], numbers[:, 2:], int(tried), fell)
+
+
+def joined(one: Assignments, other: Assignments) -> Assignments:
+    """All of both."""
+    R, t, data, model = (np.concatenate([a, b]) for a, b in zip(one[:4], other[:4], strict=True))
+    return Assignments(R, t, data, model, one.tried + other.tried, one.fell + other.fell)
 
 
 @njit(cache=True)
@@ -137,4 +156,83 @@ def _match(edges, table, lines, pairs, limits, most):
                     t_out[n, r] = data / 2 - model
                 numbers[n, 0], numbers[n, 1], numbers[n, 2], numbers[n, 3] = i, j, a, b
                 n += 1
+    return R_out[:n], t_out[:n], numbers[:n], tried, fell
+
+
+@njit(cache=True)
+def _axes(along, across, out):
+    """Columns: a direction, one made square to it, and their common normal."""
+    dot = along[0] * across[0] + along[1] * across[1] + along[2] * across[2]
+    x, y, z = across[0] - dot * along[0], across[1] - dot * along[1], across[2] - dot * along[2]
+    size = np.sqrt(x * x + y * y + z * z)
+    for r in range(3):
+        out[r, 0] = along[r]
+    out[0, 1], out[1, 1], out[2, 1] = x / size, y / size, z / size
+    out[0, 2] = along[1] * out[2, 1] - along[2] * out[1, 1]
+    out[1, 2] = along[2] * out[0, 1] - along[0] * out[2, 1]
+    out[2, 2] = along[0] * out[1, 1] - along[1] * out[0, 1]
+
+
+@njit(cache=True)
+def _match_parallel(edges, table, lines, pairs, limits, most):
+    R_out, t_out = np.empty((most, 3, 3)), np.empty((most, 3))
+    numbers, fell = np.empty((most, 4), dtype=np.int64), np.zeros(4, dtype=np.int64)
+    frame_model, frame_data = np.empty((3, 3)), np.empty((3, 3))
+    slides = np.empty(4)
+    n = tried = 0
+    for p in range(len(pairs.first)):
+        i, j = pairs.first[p], pairs.second[p]
+        turned = 1.0 if (lines.direction[i] * lines.direction[j]).sum() > 0 else -1.0
+        for q in range(len(table.first)):
+            a, b = table.first[q], table.second[q]
+            tried += 1
+            if abs(pairs.d[p] - table.d[q]) > limits.offset:
+                fell[1] += 1
+                continue
+            if lines.half[i] > edges.half[a] + limits.reach / 2 or lines.half[j] > edges.half[b] + limits.reach / 2:
+                fell[2] += 1
+                continue
+            same = 1.0 if (edges.direction[a] * edges.direction[b]).sum() > 0 else -1.0
+            for sign in (-1.0, 1.0):
+                _axes(edges.direction[a], table.across[q], frame_model)
+                _axes(sign * lines.direction[i], pairs.across[p], frame_data)
+                R = frame_data @ frame_model.T
+                other = sign * turned * same
+                if not (
+                    _flanks_agree(R, edges, a, lines, i, sign, limits.flank) and _flanks_agree(R, edges, b, lines, j, other, limits.flank)
+                ):
+                    fell[3] += 1
+                    continue
+                # where the middle of edge i lies on model edge a, as an end of one or the other edge says
+                skip = sign * pairs.ahead[p] - table.ahead[q]
+                slides[0], slides[1] = edges.half[a] - lines.half[i], lines.half[i] - edges.half[a]
+                slides[2], slides[3] = edges.half[b] - lines.half[j] - skip, lines.half[j] - edges.half[b] - skip
+                for k in range(4):
+                    x = slides[k]
+                    beyond = max(abs(x) + lines.half[i] - edges.half[a], abs(x + skip) + lines.half[j] - edges.half[b])
+                    again = False
+                    for earlier in range(k):
+                        again = again or abs(slides[earlier] - x) < limits.reach / 2
+                    if again or beyond > limits.reach:
+                        fell[2] += not again
+                        continue
+                    if n == most:
+                        return R_out, t_out, numbers, tried, fell
+                    for r in range(3):
+                        model = 0.0
+                        for c in range(3):
+                            model += (
+                                R[r, c]
+                                * (
+                                    edges.middle[a, c]
+                                    + x * edges.direction[a, c]
+                                    + edges.middle[b, c]
+                                    + same * (x + skip) * edges.direction[b, c]
+                                )
+                                / 2
+                            )
+                            R_out[n, r, c] = R[r, c]
+                        t_out[n, r] = (lines.middle[i, r] + lines.middle[j, r]) / 2 - model
+                    numbers[n, 0], numbers[n, 1], numbers[n, 2], numbers[n, 3] = i, j, a, b
+                    n += 1
     return R_out[:n], t_out[:n], numbers[:n], tried, fell

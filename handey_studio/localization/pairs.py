@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.lines import RelativePose, relative_pose
-from handey_studio.localization.edges import CONCAVE, CONVEX, JUMP, KIND_NAMES
+from handey_studio.localization.edges import KIND_NAMES
 from handey_studio.localization.segments import DataEdge
 from handey_studio.world.part import Part
 
 MIN_ALPHA = np.deg2rad(25.0)  # nearer to parallel, the foot of the common perpendicular is too uncertain
 SHARP = np.deg2rad(15.0)  # model edges blunter than this make no crease that could be found
-SAME_M = 1e-5
+SAME_M, SAME_RAD = 1e-5, 1e-6
 
 
 class ModelEdges(NamedTuple):
@@ -53,6 +53,17 @@ class Pairs(NamedTuple):
     foot2: NDArray
 
 
+class ParallelPairs(NamedTuple):
+    """Pairs of parallel edges `first`, `second` (n,): `across` (n, 3) the unit direction from the first line to the second, `d` (n,) [m]
+    how far apart they are, and `ahead` (n,) [m] by how much the second's middle lies ahead of the first's along the first's direction."""
+
+    first: NDArray
+    second: NDArray
+    across: NDArray
+    d: NDArray
+    ahead: NDArray
+
+
 @lru_cache(maxsize=64)
 def model_edges(part: Part) -> ModelEdges:
     """The edges of a part that can be seen as edges."""
@@ -71,11 +82,25 @@ def model_pairs(part: Part) -> Pairs:
     edges = model_edges(part)
     first, second = (index.reshape(-1) for index in np.indices((len(edges.half),) * 2))
     pairs = _pairs(edges.middle, edges.direction, first, second)
-    images = [_image(edges, T) for T in part.symmetries]
-    number = pairs.first * len(edges.half) + pairs.second
-    lowest = np.min([image[pairs.first] * len(edges.half) + image[pairs.second] for image in images], axis=0)
-    keep = lowest == number
+    keep = _foremost(part, edges, pairs.first, pairs.second)
     return Pairs(*(array[keep] for array in pairs))
+
+
+@lru_cache(maxsize=64)
+def model_parallels(part: Part) -> ParallelPairs:
+    """The part's ordered pairs of parallel edges on different lines, one of each that its symmetries map onto one another."""
+    edges = model_edges(part)
+    first, second = (index.reshape(-1) for index in np.indices((len(edges.half),) * 2))
+    pairs = _parallels(edges.middle, edges.direction, first, second, SAME_RAD)
+    keep = _foremost(part, edges, pairs.first, pairs.second) & (pairs.d > SAME_M)
+    return ParallelPairs(*(array[keep] for array in pairs))
+
+
+def _foremost(part: Part, edges: ModelEdges, first: NDArray, second: NDArray) -> NDArray:
+    """Which ordered pairs (n,) of edges come first among their images under the part's symmetries."""
+    n = len(edges.half)
+    images = [_image(edges, T) for T in part.symmetries]
+    return np.min([image[first] * n + image[second] for image in images], axis=0) == first * n + second
 
 
 def data_lines(edges: tuple[DataEdge, ...]) -> DataLines:
@@ -98,6 +123,26 @@ def data_pairs(lines: DataLines, reach: float) -> Pairs:
     first, second = _together(lines, reach)
     order = np.argsort(-np.minimum(lines.half[first], lines.half[second]), kind="stable")
     return _pairs(lines.middle, lines.direction, first[order], second[order])
+
+
+def data_parallels(lines: DataLines, reach: float, angle: float) -> ParallelPairs:
+    """Pairs of data edges that are parallel to within `angle` [rad] and whose ends lie within `reach` [m], long ones first."""
+    first, second = _together(lines, reach)
+    order = np.argsort(-np.minimum(lines.half[first], lines.half[second]), kind="stable")
+    return _parallels(lines.middle, lines.direction, first[order], second[order], angle)
+
+
+def _parallels(middle: NDArray, direction: NDArray, first: NDArray, second: NDArray, angle: float) -> ParallelPairs:
+    cosine = np.einsum("ij,ij->i", direction[first], direction[second])
+    first, second, cosine = (array[np.abs(cosine) >= np.cos(angle)] for array in (first, second, cosine))
+    # both lines' mean direction: neither alone is as good
+    along = direction[first] + np.sign(cosine)[:, None] * direction[second]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    between = middle[second] - middle[first]
+    ahead = np.einsum("ij,ij->i", between, along)
+    across = between - ahead[:, None] * along
+    d = np.linalg.norm(across, axis=1)
+    return ParallelPairs(first, second, across / np.maximum(d, 1e-12)[:, None], d, ahead)
 
 
 def _together(lines: DataLines, reach: float) -> tuple[NDArray, NDArray]:
@@ -124,6 +169,3 @@ def _image(edges: ModelEdges, T: NDArray) -> NDArray:
     distance = np.linalg.norm(moved[:, None] - edges.middle[None], axis=2)
     across = 1.0 - np.abs(turned @ edges.direction.T)
     return np.argmin(distance + across, axis=1)
-
-
-__all__ = ["CONCAVE", "CONVEX", "JUMP", "DataLines", "ModelEdges", "Pairs", "data_lines", "data_pairs", "model_edges", "model_pairs"]

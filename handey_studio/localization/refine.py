@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.localization.edges import JUMP
 from handey_studio.localization.evidence import Evidence, Limits, ray_at
 from handey_studio.localization.samples import PartSamples
 from handey_studio.localization.verify import GRAZING, ON, _dot, edge_state, facing, reading_at
@@ -127,7 +128,7 @@ def _outlines(R, t, margin, samples, evidence, limits, sigma, A, g):
         depth = z / q[2] if evidence.camera[0] < 0.5 else 1.0  # along the pixel's ray to the outline's depth
         residual = mx * (q[0] * depth - x) + my * (q[1] * depth - y)
         _row(row, mx, my, mz, px, py, pz)
-        if (left != right) and evidence.edge_jump[e]:
+        if (left != right) and evidence.edge_kind[e] == JUMP:
             residual += margin
             row[6] = -1.0
         _add(A, g, row, residual, sigma)

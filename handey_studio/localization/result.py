@@ -20,9 +20,9 @@ class LocateOptions:
     min_score: float = 0.5
     min_visible_fraction: float = 0.1
     min_edge_m: float | None = None
-    max_data_edges: int = 120
+    max_data_edges: int = 600
     max_hypotheses: int = 40000
-    max_refined: int = 60
+    max_refined: int = 300
     table_z_m: float | None = 0.0
 
 

@@ -12,7 +12,7 @@ from handey_studio.world.part import Part
 EDGE_SAMPLES = 320
 FACE_SAMPLES = 900
 DENSER = 6  # times as many for the last refinement, which averages the noise of readings
-THINNING = 3
+THINNING = 5
 MIN_PER_EDGE = 4
 MIN_PER_FACE = 12
 

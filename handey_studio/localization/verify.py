@@ -10,14 +10,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from handey_studio.localization.evidence import Evidence, Limits, nearest_edge, project, ray_at
+from handey_studio.localization.edges import CONVEX
+from handey_studio.localization.evidence import Evidence, Limits, nearest_edge, pixels_per_metre, project, ray_at
 from handey_studio.localization.samples import PartSamples
 
 ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
 GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on
+CLEAR_PX = 2.5  # from the part's own edges before an edge of the view is none of them
 STEEP = 0.4  # cosine; a face seen more squarely than this should give readings
 UNREAD_COST = 0.3  # of a reading that sees through: no reading where there should be one
 ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but raggedly
+GLANCE = 90  # points of all faces that the first look takes
+MAX_THROUGH = 0.3
 MIN_VISIBLE_SHARE = 0.2  # of an edge's samples that must be visible for the edge to be predicted
 MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the edge to count as found
 
@@ -25,7 +29,8 @@ MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the 
 class Verdict(NamedTuple):
     """What speaks for and against poses (n,): `found` and `missing` [m] of visible edge; of the faces that look at the sensor [m²]
     those `on` readings, seen `through`, `hidden` behind nearer readings, and `unknown` where nothing was read; the number of
-    edges `predicted` to be seen and of those found, `edges`."""
+    edges `predicted` to be seen and of those found, `edges`; and how far found edge pixels `scatter` [m] about a common margin; and where
+    the view has a straight edge and the part none, `stray` [m²] of its faces."""
 
     found: NDArray
     missing: NDArray
@@ -35,6 +40,8 @@ class Verdict(NamedTuple):
     unknown: NDArray
     predicted: NDArray
     edges: NDArray
+    scatter: NDArray
+    stray: NDArray
 
     def rows(self, chosen: NDArray) -> "Verdict":
         """Those of some of the poses, by their numbers."""
@@ -66,6 +73,12 @@ def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, lim
     """Verdicts on the poses R (n, 3, 3), t (n, 3) of the part in the sensor's frame, from every `every`-th sample."""
     counts = _verify(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits, every)
     return Verdict(*(every * counts[:, :6]).T, *counts[:, 6:].T)
+
+
+def unopposed(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits) -> NDArray:
+    """Numbers of the poses R (n, 3, 3), t (n, 3) that a glance does not rule out: the sensor sees through less than `MAX_THROUGH` of
+    the few points of the faces that it looks at."""
+    return np.nonzero(_unopposed(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits))[0]
 
 
 @njit(cache=True)
@@ -121,26 +134,43 @@ def edge_state(R, t, k, samples, evidence, limits):
     close = edge >= 0 and sideways <= limits.edge + 0.7 * evidence.pixel and abs(evidence.edge_point[edge, 2] - z) <= limits.edge_depth
     if flanks == 2:
         return (1, edge) if close else (0, -1)
-    # a silhouette: sensors lose readings there, they do not add any
-    u, v = project(x, y, z, evidence.camera)
-    u2, v2 = project(x + inset * ix, y + inset * iy, z + inset * iz, evidence.camera)
-    du, dv = u2 - u, v2 - v
-    if close:
-        inside = (evidence.edge_uv[edge, 0] - u) * du + (evidence.edge_uv[edge, 1] - v) * dv
-        if inside * inset / (du * du + dv * dv + 1e-12) >= -limits.outside - 0.7 * evidence.pixel:
-            return 1, edge
+    # a silhouette: sensors lose readings there, they do not add any, and a surface that bends away in sight is none
+    if close and evidence.edge_kind[edge] != CONVEX and inwards(R, t, k, edge, samples, evidence) >= -limits.outside - 0.7 * evidence.pixel:
+        return 1, edge
     beyond = limits.outside + evidence.pixel
     seen = reading_at(x - beyond * ix, y - beyond * iy, z - beyond * iz, evidence, limits)[0]
-    ends = seen in (THROUGH, UNKNOWN) or (seen == HIDDEN and samples.concave[k])  # at a concave edge the part's own wall rises
-    return (2 if ends else 0), -1
+    if seen == HIDDEN:
+        return (2 if samples.concave[k] else -1), -1  # at a concave edge the part's own wall rises
+    return (0 if seen == ON else 2), -1
+
+
+@njit(cache=True)
+def inwards(R, t, k, edge, samples, evidence):
+    """How far [m] an edge pixel lies from an edge sample across the edge in the image, positive towards the face that is seen."""
+    p, a = samples.edge_point[k], samples.along[k]
+    x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
+    into = samples.into_left[k] if facing(R, samples.left[k], x, y, z, evidence.camera) >= GRAZING else samples.into_right[k]
+    step = evidence.pixel
+    u, v = project(x, y, z, evidence.camera)
+    ua, va = project(x + step * _dot(R, 0, a), y + step * _dot(R, 1, a), z + step * _dot(R, 2, a), evidence.camera)
+    ui, vi = project(x + step * _dot(R, 0, into), y + step * _dot(R, 1, into), z + step * _dot(R, 2, into), evidence.camera)
+    nu, nv = va - v, u - ua
+    length = np.sqrt(nu * nu + nv * nv) + 1e-12
+    side = 1.0 if nu * (ui - u) + nv * (vi - v) > 0 else -1.0
+    off = (evidence.edge_uv[edge, 0] - u) * nu + (evidence.edge_uv[edge, 1] - v) * nv
+    return side * off / length / pixels_per_metre(z, evidence.camera)
 
 
 @njit(cache=True)
 def _edges(R, t, samples, evidence, limits, offset, every, out):
     """Adds metres found and missing, and the edges predicted and found, of one pose."""
-    visible = found = samples_of_edge = 0
+    visible = found = samples_of_edge = matched = 0
+    total = squares = 0.0
     for k in range(offset, len(samples.edge), every):
-        state, _ = edge_state(R, t, k, samples, evidence, limits)
+        state, edge = edge_state(R, t, k, samples, evidence, limits)
+        if edge >= 0:
+            off = inwards(R, t, k, edge, samples, evidence)
+            total, squares, matched = total + off, squares + off * off, matched + 1
         weight = samples.edge_weight[k]
         if state == 2:
             out[0] += ENDS_WORTH * weight
@@ -152,6 +182,20 @@ def _edges(R, t, samples, evidence, limits, offset, every, out):
                 out[6] += 1.0
                 out[7] += found >= MIN_EDGE_SHARE * visible
             visible = found = samples_of_edge = 0
+    if matched > 0:
+        out[8] = np.sqrt(max(squares / matched - (total / matched) ** 2, 0.0))
+
+
+@njit(cache=True)
+def _on_edge(x, y, z, evidence):
+    """Whether a straight edge of the view passes within a pixel of a point."""
+    u, v = project(x, y, z, evidence.camera)
+    i, j = int(np.rint(u)), int(np.rint(v))
+    for sector in range(len(evidence.nearest)):
+        k = evidence.nearest[sector, j, i]
+        if k >= 0 and abs(evidence.edge_uv[k, 0] - u) <= 1.0 and abs(evidence.edge_uv[k, 1] - v) <= 1.0:
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -169,12 +213,32 @@ def _surfaces(R, t, samples, evidence, limits, offset, every, out):
             continue  # the margin that sensors lose at silhouettes
         if seen == UNKNOWN and cosine < STEEP:
             seen = HIDDEN  # too steep to blame the part for the missing reading
+        if seen == ON and samples.face_rim[k] * cosine > limits.edge + CLEAR_PX * evidence.pixel and _on_edge(x, y, z, evidence):
+            out[9] += samples.face_weight[k]
         out[2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += samples.face_weight[k]
 
 
 @njit(cache=True)
+def _unopposed(R, t, samples, evidence, limits):
+    good = np.zeros(len(t), dtype=np.bool_)
+    step = max(1, len(samples.face_weight) // GLANCE)
+    for n in range(len(t)):
+        on = through = 0
+        for k in range(n % step, len(samples.face_weight), step):
+            p = samples.face_point[k]
+            x, y, z = _dot(R[n], 0, p) + t[n, 0], _dot(R[n], 1, p) + t[n, 1], _dot(R[n], 2, p) + t[n, 2]
+            cosine = facing(R[n], samples.face_normal[k], x, y, z, evidence.camera)
+            if cosine < GRAZING or samples.face_rim[k] * cosine < limits.edge:
+                continue
+            seen, _ = reading_at(x, y, z, evidence, limits)
+            on, through = on + (seen == ON), through + (seen == THROUGH)
+        good[n] = on > 0 and through <= MAX_THROUGH * (on + through)
+    return good
+
+
+@njit(cache=True)
 def _verify(R, t, samples, evidence, limits, every):
-    out = np.zeros((len(t), 8))
+    out = np.zeros((len(t), 10))
     for n in range(len(t)):
         _edges(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
         _surfaces(R[n], t[n], samples, evidence, limits, n % every, every, out[n])

@@ -36,7 +36,7 @@ def edge_of(part, number, T, span=(0.0, 1.0), turned=False):
 
 def matches(part, edges, most=5000):
     lines = data_lines(tuple(edges))
-    return hypothesize(model_edges(part), model_pairs(part), lines, data_pairs(lines), TIGHT, most)
+    return hypothesize(model_edges(part), model_pairs(part), lines, data_pairs(lines, np.inf), TIGHT, most)
 
 
 @pytest.mark.parametrize("part", [BRICK, L], ids=lambda part: part.name)
