@@ -1,8 +1,8 @@
-"""Reading depth from files: 16-bit images with a camera in the BOP convention, and organised clouds."""
+"""Reading depth from files: 16-bit images with a camera in the BOP convention, and clouds."""
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -10,58 +10,74 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.base import BadInput, Value
+from handey_studio.base import BadInput, Value, frozen_array
 from handey_studio.geometry.transforms import is_rigid
-from handey_studio.sensing.depth_view import DepthView, Pinhole
-from handey_studio.sensing.noise import measured_noise
+from handey_studio.sensing.cloud_views import UNITS_M, view_of_cloud
+from handey_studio.sensing.clouds import MAX_CLOUD_BYTES, MAX_SIDE, Cloud, read_npy
+from handey_studio.sensing.depth_view import DepthView, Orthographic, Pinhole
+from handey_studio.sensing.noise import noise_of
 from handey_studio.sensing.outlines import measured_outline_error
+from handey_studio.sensing.pcd import read_pcd
+from handey_studio.sensing.ply import read_ply
+from handey_studio.sensing.reduce import reduced
 
-MAX_SIDE_PX = 4096
-MAX_DEPTH_BYTES = 420_000_000  # a cloud of 4096 × 4096 points of three float64 numbers, and its header
 MAX_CAMERA_BYTES = 1_000_000
 MAX_DEPTH_M = 100.0
-PINHOLE_RMS_PX = 1.0  # an organised cloud whose points miss the best pinhole's pixels by more is no single image
 MIN_READINGS = 100
+CLOUDS = {".npy": read_npy, ".ply": read_ply, ".pcd": read_pcd}
 
 
 @dataclass(frozen=True, eq=False)
 class DepthReading(Value):
     """A depth view from a file. `knows_world` tells whether the file said where the sensor stands; without that the
-    view's world is its sensor's frame, and `support_plane` can find a better one."""
+    view's world is its sensor's frame, and `support_plane` can find a better one.
+
+    `T_file_sensor` (4, 4) takes the view's sensor frame to the frame that the file's points are in: the identity but for clouds in
+    other frames than their sensor's. The view has one pixel for `reduced_by` × `reduced_by` of the file's.
+    """
 
     view: DepthView
     knows_world: bool
+    T_file_sensor: NDArray = field(default_factory=lambda: np.eye(4))
+    reduced_by: int = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_file_sensor", frozen_array(self.T_file_sensor))
 
 
-def read_depth(depth_path: str | os.PathLike, camera_path: str | os.PathLike | None = None) -> DepthReading:
-    """A depth image or an organised cloud as a view.
+def read_depth(depth_path: str | os.PathLike, camera_path: str | os.PathLike | None = None, cloud_unit: str = "m") -> DepthReading:
+    """A depth image or a cloud as a view.
 
     A 16-bit PNG holds raw × depth_scale = millimetres along the optical axis, 0 = no reading, and needs the camera's
-    JSON (fx, fy, cx, cy, depth_scale, optional width, height and T_world_sensor). An organised `.npy` holds
-    (H, W, 3) metres in the sensor's frame, NaN = no reading; its pinhole is found by least squares when no camera is
-    given. Raises BadInput with one sentence.
+    JSON (fx, fy, cx, cy, depth_scale, optional width, height and T_world_sensor). Clouds are `.npy` arrays (H, W, 3) or (n, 3), PLY and
+    PCD files with coordinates in `cloud_unit`, one of m, cm, mm; NaN = no reading. An organised cloud's pinhole is found by least
+    squares when no camera is given; other clouds become an image as `grid_points` tells. Noise and outline error are measured.
+    Raises BadInput with one sentence.
     """
     path = Path(depth_path)
     camera = None if camera_path is None else _read_camera(Path(camera_path))
-    _check_size(path, MAX_DEPTH_BYTES, "depth file")
-    if path.suffix.lower() == ".png":
+    _check_size(path, MAX_CLOUD_BYTES, "depth file")
+    suffix = path.suffix.lower()
+    if suffix != ".png" and suffix not in CLOUDS:
+        raise BadInput(f'depth file "{path}" has the suffix "{path.suffix}"; it must be one of .png, {", ".join(CLOUDS)}.')
+    if suffix == ".png":
         if camera is None:
             raise BadInput(f'depth image "{path}" needs a camera file with fx, fy, cx, cy and depth_scale.')
         scale = _number(camera, "depth_scale", low=1e-6, high=1e4)
-        depth, quantum = _read_png(path, scale), 1e-3 * scale
-        pinhole = _pinhole(camera)
-    elif path.suffix.lower() == ".npy":
-        points = _read_cloud(path)
-        depth, quantum = points[..., 2], 0.0
-        pinhole = _fit_pinhole(points, path) if camera is None else _pinhole(camera)
+        depth, projection, T_file_sensor, quantum = _read_png(path, scale), _pinhole(camera), np.eye(4), 1e-3 * scale
     else:
-        raise BadInput(f'depth file "{path}" has the suffix "{path.suffix}"; it must be one of .png, .npy.')
-    return _reading(path, depth, pinhole, camera or {}, quantum)
+        if cloud_unit not in UNITS_M:
+            raise BadInput(f'the cloud\'s unit "{cloud_unit}" is not known; choose one of: {", ".join(UNITS_M)}.')
+        pinhole = None if camera is None else _pinhole(camera)
+        depth, projection, T_file_sensor = view_of_cloud(path, _read_cloud(path, suffix), UNITS_M[cloud_unit], pinhole, _size_of(camera))
+        quantum = 0.0
+    return _reading(path, depth, projection, camera or {}, quantum, T_file_sensor)
 
 
-def _reading(path: Path, depth: NDArray, pinhole: Pinhole, camera: dict[str, Any], quantum: float) -> DepthReading:
-    depth = np.where(np.isfinite(depth) & (depth > 0) & (depth <= MAX_DEPTH_M), depth, np.nan)
-    readings = int(np.isfinite(depth).sum())
+def _reading(
+    path: Path, depth: NDArray, projection: Pinhole | Orthographic, camera: dict[str, Any], quantum: float, T_file_sensor: NDArray
+) -> DepthReading:
+    readings = _only_readings(depth)
     if readings < MIN_READINGS:
         raise BadInput(
             f'depth file "{path}" has {readings} readings between 0 and {MAX_DEPTH_M:.0f} m; at least {MIN_READINGS} are needed.'
@@ -71,9 +87,36 @@ def _reading(path: Path, depth: NDArray, pinhole: Pinhole, camera: dict[str, Any
             raise BadInput(f'depth file "{path}" is {depth.shape[1]} × {depth.shape[0]} px, but its camera says {key} {camera[key]}.')
     given = camera.get("T_world_sensor")
     T_world_sensor = np.eye(4) if given is None else _rigid(given)
-    noise = measured_noise(depth, pinhole, quantum)
-    outline = measured_outline_error(depth, pinhole, noise)
-    return DepthReading(DepthView(depth, pinhole, T_world_sensor, noise=noise, outline_error=outline), given is not None)
+    depth, projection, factor = reduced(depth, projection)
+    noise = noise_of(depth, projection, quantum)
+    outline = measured_outline_error(depth, projection, noise.sigma)
+    view = DepthView(depth, projection, T_world_sensor, noise.sigma, outline)
+    return DepthReading(view, given is not None, T_file_sensor, factor)
+
+
+def _only_readings(depth: NDArray) -> int:
+    """Make what is no reading NaN, in place and a few rows at a time; how many readings are left."""
+    count = 0
+    for start in range(0, len(depth), 256):
+        rows = depth[start : start + 256]
+        rows[~((rows > 0) & (rows <= MAX_DEPTH_M))] = np.nan
+        count += int(np.isfinite(rows).sum())
+    return count
+
+
+def _read_cloud(path: Path, suffix: str) -> Cloud:
+    try:
+        return CLOUDS[suffix](path)
+    except OSError as error:
+        raise BadInput(f'cloud "{path}" cannot be read: {error.strerror}.') from None
+
+
+def _size_of(camera: dict[str, Any] | None) -> tuple[int, int] | None:
+    """(height, width) [px] that a camera names."""
+    if camera is None or "width" not in camera or "height" not in camera:
+        return None
+    height, width = (int(_number(camera, key, low=1, high=MAX_SIDE)) for key in ("height", "width"))
+    return height, width
 
 
 def _check_size(path: Path, limit: int, kind: str) -> None:
@@ -90,8 +133,8 @@ def _check_size(path: Path, limit: int, kind: str) -> None:
 
 
 def _check_sides(path: Path, width: int, height: int) -> None:
-    if not (1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX):
-        raise BadInput(f'depth file "{path}" is {width} × {height} px, the limit is {MAX_SIDE_PX} × {MAX_SIDE_PX}.')
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+        raise BadInput(f'depth file "{path}" is {width} × {height} px, the limit is {MAX_SIDE} × {MAX_SIDE}.')
 
 
 def _read_png(path: Path, depth_scale: float) -> NDArray:
@@ -112,42 +155,7 @@ def _read_png(path: Path, depth_scale: float) -> NDArray:
     if raw.dtype != np.uint16 or raw.ndim != 2:
         channels = 1 if raw.ndim == 2 else raw.shape[2]
         raise BadInput(f'depth image "{path}" has {channels} channels of {raw.dtype}; it must have one channel of uint16.')
-    return raw.astype(float) * (depth_scale * 1e-3)
-
-
-def _read_cloud(path: Path) -> NDArray:
-    """Points (H, W, 3) [m]."""
-    try:
-        cloud = np.load(path, allow_pickle=False, mmap_mode="r")
-    except (OSError, ValueError, EOFError, SyntaxError) as error:
-        raise BadInput(f'organised cloud "{path}" cannot be read as an array: {str(error).splitlines()[0]}') from None
-    if not isinstance(cloud, np.ndarray) or cloud.ndim != 3 or cloud.shape[2] != 3 or cloud.dtype.kind != "f":
-        shape = getattr(cloud, "shape", "unknown")
-        raise BadInput(f'organised cloud "{path}" has shape {shape}; it must be (H, W, 3) floating-point metres.')
-    _check_sides(path, cloud.shape[1], cloud.shape[0])
-    points = np.array(cloud, dtype=float)
-    points[~np.isfinite(points).all(axis=-1)] = np.nan
-    return points
-
-
-def _fit_pinhole(points: NDArray, path: Path) -> Pinhole:
-    """The pinhole that saw an organised cloud, by least squares over its pixels."""
-    v, u = np.nonzero(np.isfinite(points[..., 2]) & (points[..., 2] > 0))
-    if len(u) < MIN_READINGS:
-        raise BadInput(f'organised cloud "{path}" has {len(u)} readings in front of the sensor; at least {MIN_READINGS} are needed.')
-    x, y, z = points[v, u].T
-    numbers, worst = [], 0.0
-    for ratio, pixel in ((x / z, u), (y / z, v)):
-        (f, c), *_ = np.linalg.lstsq(np.c_[ratio, np.ones(len(ratio))], pixel.astype(float), rcond=None)
-        worst = max(worst, float(np.sqrt(np.mean((f * ratio + c - pixel) ** 2))))
-        numbers += [float(f), float(c)]
-    fx, cx, fy, cy = numbers
-    if worst > PINHOLE_RMS_PX or min(fx, fy) <= 0:
-        raise BadInput(
-            f'organised cloud "{path}" is not the image of one pinhole (its points miss their pixels by {worst:.3g} px rms, the limit is '
-            f"{PINHOLE_RMS_PX:g}); give the camera, or a cloud as one camera sees it."
-        )
-    return Pinhole(fx, fy, cx, cy)
+    return raw * (depth_scale * 1e-3)
 
 
 def _read_camera(path: Path) -> dict[str, Any]:
