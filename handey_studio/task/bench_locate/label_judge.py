@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_erosion, distance_transform_edt
+from scipy.ndimage import binary_erosion, binary_fill_holes
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.cell.bodies import SolidBody
@@ -20,7 +20,8 @@ MOST_OUTLINE_MM = 6.0
 MOST_MEDIAN_MM = 6.0
 MOST_P90_MM = 10.0
 MOST_SEEN_THROUGH = 0.12
-DEPTH_MM = 15.0  # a reading this much nearer than the part hides it; one this much farther has seen through it
+HIDING_MM = 12.0  # a reading this much nearer than the part hides it: five standard deviations of a depth camera at 1 m
+SEEN_THROUGH_MM = 15.0  # a reading this much farther has seen through it
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +71,20 @@ class LabelJudge(Value):
 
 
 def measures(drawn: NDArray, view: DepthView, mask: NDArray) -> dict[str, float]:
-    """How a part drawn as depth (H, W) [m] compares with readings and a label's mask (H, W). What cannot be measured is left out."""
+    """How a part drawn as depth (H, W) [m] compares with readings and a label's mask (H, W). Pixels without a reading say nothing; what
+    cannot be measured is left out."""
+    read = np.isfinite(view.depth)
     with np.errstate(invalid="ignore"):
         away_mm = 1e3 * (view.depth - drawn)  # of the reading beyond the part
-        shown = np.isfinite(drawn) & ~(away_mm < -DEPTH_MM)
-    read = shown & np.isfinite(view.depth)
-    on = np.abs(away_mm[read & mask])
+        shown = read & np.isfinite(drawn) & ~(away_mm < -HIDING_MM)
+    label = mask & read
+    on = np.abs(away_mm[label & np.isfinite(drawn)])
     told = {
-        "iou": float((shown & mask).sum() / max((shown | mask).sum(), 1)),
-        "outline_mm": _outline_mm(shown, mask, drawn, view),
+        "iou": float((shown & label).sum() / max((shown | label).sum(), 1)),
+        "outline_mm": _outline_mm(shown, label, view),
         "median_mm": float(np.median(on)) if len(on) else np.inf,
         "p90_mm": float(np.percentile(on, 90)) if len(on) else np.inf,
-        "seen_through": float((away_mm[read] > DEPTH_MM).mean()) if read.any() else 1.0,
+        "seen_through": float((away_mm[read & np.isfinite(drawn)] > SEEN_THROUGH_MM).mean()) if shown.any() else 1.0,
     }
     return {key: value for key, value in told.items() if np.isfinite(value)}
 
@@ -92,16 +95,13 @@ def passes(look: dict[str, float]) -> bool:
     return look["iou"] >= LEAST_IOU and all(look.get(key, np.inf) <= limit for key, limit in limits.items())
 
 
-def _outline_mm(shown: NDArray, mask: NDArray, drawn: NDArray, view: DepthView) -> float:
-    """Mean distance between the outlines of two masks, both ways, in mm at the part's depth."""
-    if not shown.any() or not mask.any():
+def _outline_mm(shown: NDArray, label: NDArray, view: DepthView) -> float:
+    """Mean distance between two outlines in mm: the area between them over the label's outline."""
+    rim = label & ~binary_erosion(binary_fill_holes(label), border_value=1)
+    if not rim.any():
         return np.inf
-    rims = [area & ~binary_erosion(area, border_value=1) for area in (shown, mask)]
-    if not all(rim.any() for rim in rims):
-        return np.inf
-    gaps = [np.asarray(distance_transform_edt(~other))[rim].mean() for rim, other in (rims, rims[::-1])]
-    pixels_per_metre = float(np.mean(view.projection.pixels_per_metre(float(np.nanmedian(drawn[shown])))))
-    return float(1e3 * np.mean(gaps) / pixels_per_metre)
+    pixels_per_metre = float(np.mean(view.projection.pixels_per_metre(float(np.median(view.depth[label])))))
+    return float(1e3 * (shown ^ label).sum() / rim.sum() / pixels_per_metre)
 
 
 def _rigid(T: NDArray) -> NDArray:
