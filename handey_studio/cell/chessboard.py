@@ -15,6 +15,7 @@ from handey_studio.geometry.transforms import apply, inverse, transform
 
 WHITE, BLACK = 0.9, 0.12
 THICK_M = 0.003
+LAID_RAD = np.deg2rad(11.0)  # nobody lays a board down square
 MARGIN = 0.8  # of a square: the paper's white around the pattern
 
 
@@ -60,7 +61,7 @@ def board_poses(count: int, rng: np.random.Generator, reach: float = 0.03, heigh
 
     They are raised up to `height` [m] and tilted up to `tilt` [rad].
     """
-    poses = [np.eye(4)]
+    poses = [transform(Rotation.from_rotvec((0.0, 0.0, LAID_RAD)).as_matrix())]
     for k in range(1, count):
         away = rng.uniform(-reach, reach, 2)
         turn = rng.uniform(0.4, 1.0) * tilt

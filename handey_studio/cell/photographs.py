@@ -22,6 +22,7 @@ LASERS = {"red": (0.03, 0.06, 1.0), "green": (0.08, 1.0, 0.10), "grey": (1.0, 1.
 ROOM = (0.85, 1.0, 0.95)
 BRIGHTNESSES = (0.55, 0.4, 0.618034)  # least, span, and the step by which bodies get theirs: no two neighbours alike
 EDGE_LIGHT = 1.0  # of 255, between neighbours, that asks for more rays
+GOLDEN = 0.618034
 STRIPE_SIGMAS = 4.5  # beyond so many, the stripe's light is under a thousandth of a grey level
 
 Paint = Callable[[NDArray, NDArray], NDArray]  # how white (n,) the surface is, from faces (n,) and points (n, 3) of the range frame
@@ -32,13 +33,13 @@ class Exposure:
     """Light on a scale of 255: `room` on a white surface seen squarely, `laser` in the stripe's middle on one lit squarely.
 
     `line_sigma` [m] is the stripe's half width (one sigma), `blur_px` the lens's, `noise` the sensor's standard deviation. Each pixel
-    averages `samples` × `samples` rays.
+    averages `samples`² rays.
     """
 
     room: float = 35.0
     laser: float = 170.0
     line_sigma: float = 0.0005
-    blur_px: float = 0.5
+    blur_px: float = 0.8
     noise: float = 1.5
     colour: str = "red"
     samples: int = 3
@@ -70,8 +71,7 @@ def body_paint(bodies: Sequence[SolidBody]) -> Paint:
 def see(camera: StripeCamera, surfaces: Surfaces, paint: Paint, samples: int, pixels: NDArray | None = None) -> Seen:
     """The first surfaces along a camera's rays, `samples` × `samples` a pixel: of all pixels, or of those numbered (row by row)."""
     pixels = np.arange(camera.width * camera.height) if pixels is None else pixels
-    part = (np.arange(samples) + 0.5) / samples - 0.5
-    parts = np.stack(np.meshgrid(part, part), axis=-1).reshape(-1, 2)
+    parts = _spread(samples**2)
     number = np.repeat(pixels, len(parts))
     uv = np.stack([number % camera.width, number // camera.width], axis=1) + np.tile(parts, (len(pixels), 1))
     rays = camera.rays(uv)
@@ -80,6 +80,12 @@ def see(camera: StripeCamera, surfaces: Surfaces, paint: Paint, samples: int, pi
     hit = hits.face >= 0
     white = paint(hits.face[hit], hits.points[hit])
     return Seen((camera.height, camera.width), number[hit], hits.points[hit], hits.cosine[hit], white, samples)
+
+
+def _spread(count: int) -> NDArray:
+    """Places (count, 2) in a pixel, in [−½, ½], no two in one row or column: on a square grid an upright edge could only move by jumps."""
+    k = np.arange(count)
+    return np.stack([(k + 0.5) / count, (0.5 + k * GOLDEN) % 1.0], axis=1) - 0.5
 
 
 def room_light(seen: Seen, exposure: Exposure) -> NDArray:

@@ -64,16 +64,17 @@ def find_corners(grey: NDArray, board: Board) -> NDArray | None:
     found, corners = cv2.findChessboardCornersSB(image, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY)
     if not found:
         found, corners = cv2.findChessboardCorners(image, size, flags=cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE)
-        if found:
-            window = _window(np.asarray(corners).reshape(board.rows, board.columns, 2))
-            corners = cv2.cornerSubPix(image, corners, (window, window), (-1, -1), REFINE)
-    return np.asarray(corners, dtype=float).reshape(-1, 2) if found else None
+    if not found:
+        return None
+    corners = np.ascontiguousarray(corners, dtype=np.float32).reshape(-1, 1, 2)
+    window = _window(corners.reshape(board.rows, board.columns, 2))
+    return np.asarray(cv2.cornerSubPix(image, corners, (window, window), (-1, -1), REFINE), dtype=float).reshape(-1, 2)
 
 
 def _window(corners: NDArray) -> int:
     """Half the side [px] of a window that holds one corner only."""
     steps = [np.linalg.norm(np.diff(corners, axis=axis), axis=-1).min() for axis in (0, 1)]
-    return int(np.clip(min(steps) / 3, 2, 11))
+    return int(np.clip(0.4 * min(steps), 2, 11))
 
 
 @dataclass(frozen=True, eq=False)

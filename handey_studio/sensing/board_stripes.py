@@ -4,21 +4,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.sensing.board import Board
-from handey_studio.sensing.photographs import read_photograph
+from handey_studio.sensing.photographs import Photograph, read_photograph
 from handey_studio.sensing.stripe_camera import StripeCamera, points_on_planes
 from handey_studio.sensing.stripe_light import LaserColour, laser_colour, laser_light
-from handey_studio.sensing.stripe_peaks import PeakOptions, find_peaks, stripe_direction
+from handey_studio.sensing.stripe_peaks import PeakOptions, StripePeaks, find_peaks, stripe_direction
 
 SAMPLES = 5  # photographs by which the laser's colour and the stripe's direction are told
 LEAST_PEAKS = 20  # on a board, for its stripe to count
 STRAIGHT = 0.05  # of a square: peaks farther from the board's straight stripe are not of it
 STRAIGHT_SHARE = 0.5  # of a board's peaks that must lie on it
 TRIES = 200
+UNEVEN = 0.2  # difference of a board's light on the two sides of a peak, of their sum, from which the peak is not trusted
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +44,23 @@ def board_stripes(
     for one in boards:
         lit, dark = read_photograph(one.lit), None if one.dark is None else read_photograph(one.dark)
         peaks = find_peaks(laser_light(lit, dark, colour), lit.saturated, direction, options)
-        stripes.append(on_board(peaks.uv, camera, one.T_camera_board, board))
+        even = slice(None) if dark is None else _on_even_ground(peaks, dark, direction)
+        stripes.append(on_board(peaks.uv[even], camera, one.T_camera_board, board))
     return colour, stripes
+
+
+def _on_even_ground(peaks: StripePeaks, dark: Photograph, direction: str) -> NDArray:
+    """Which peaks (n,) have as white a board on one side as on the other: along a border of squares a stripe leans to the white."""
+    white = cv2.GaussianBlur(dark.light.mean(axis=2), (0, 0), 1.0)
+    side = np.zeros((len(peaks.uv), 2))
+    side[:, 1 if direction == "across" else 0] = 0.75 * peaks.width + 1.0
+    a, b = (_at(white, peaks.uv + sign * side) for sign in (-1, 1))
+    return np.abs(a - b) <= UNEVEN * (a + b)
+
+
+def _at(image: NDArray, uv: NDArray) -> NDArray:
+    u, v = np.round(uv).astype(int).T
+    return image[np.clip(v, 0, image.shape[0] - 1), np.clip(u, 0, image.shape[1] - 1)]
 
 
 def on_board(uv: NDArray, camera: StripeCamera, T_camera_board: NDArray, board: Board) -> NDArray | None:

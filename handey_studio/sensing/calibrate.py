@@ -27,6 +27,7 @@ from handey_studio.sensing.stripe_peaks import PeakOptions
 LASER, MOVED = "laser", "moved"
 EACH = 100  # points of each board that the plane is fitted to, so that every pose counts alike
 SPREAD = (10.0, 0.02)  # least extent across the stripes: times the points' rms, and of their extent along
+LEAST_STEP_M = 1e-6
 PURE_SHIFT_RAD = np.deg2rad(0.5)  # a rig that turns by less between two photographs only shifts
 
 
@@ -34,12 +35,14 @@ PURE_SHIFT_RAD = np.deg2rad(0.5)  # a rig that turns by less between two photogr
 class CalibrateOptions:
     """`channel` is the laser's colour; `table` names the board's photograph whose plane is the range frame's z = 0, else the first.
 
-    `steps` is how many of the rig's steps lie between each `NAME` and `NAME.moved`.
+    `steps` is how many of the rig's steps lie between `NAME` and `NAME.moved`; `step_m` is a step's length [m] where that is known better
+    than two photographs can tell: these then give its direction only.
     """
 
     channel: str = "auto"
     table: str | None = None
     steps: int = 1
+    step_m: float | None = None
     peaks: PeakOptions = field(default_factory=PeakOptions)
 
 
@@ -163,7 +166,7 @@ def _calibration(
     normal = T_range_camera[:3, :3] @ plane.plane[:3]
     in_range = np.array([*normal, plane.plane[3] + normal @ T_range_camera[:3, 3]])
     camera = replace(fit.camera, T_range_camera=T_range_camera)
-    step = _rig_step(boards, board, fit, names, T_range_camera, options.steps)
+    step = _rig_step(boards, board, fit, names, T_range_camera, options)
     rms = {name: float(np.sqrt(np.mean(distances(plane.plane, points) ** 2))) for name, points in stripes.items()}
     return Calibration(
         instrument=Instrument((camera,), ("",), in_range[None], rig_step=step),
@@ -202,7 +205,9 @@ def _range_frame(T_camera_board: NDArray, board: Board) -> NDArray:
     return inverse(transform(np.stack([x, np.cross(up, x), up], axis=1), origin))
 
 
-def _rig_step(boards: _Boards, board: Board, fit: CameraFit, names: list[str], T_range_camera: NDArray, steps: int) -> NDArray | None:
+def _rig_step(
+    boards: _Boards, board: Board, fit: CameraFit, names: list[str], T_range_camera: NDArray, options: CalibrateOptions
+) -> NDArray | None:
     """T_range_rig of one step, from the photographs of boards that stayed while the rig moved; None without such."""
     poses = dict(zip(names, fit.Ts_camera_board, strict=True))
     for path in boards.paths:
@@ -213,18 +218,25 @@ def _rig_step(boards: _Boards, board: Board, fit: CameraFit, names: list[str], T
         if corners is None:
             raise BadInput(f'the board was not found in "{moved}".')
         after = place_boards(board, [corners], fit.camera).Ts_camera_board[0]
-        return _one_step(poses[path.stem], after, board, T_range_camera, steps)
+        return _one_step(poses[path.stem], after, board, T_range_camera, options)
     return None
 
 
-def _one_step(before: NDArray, after: NDArray, board: Board, T_range_camera: NDArray, steps: int) -> NDArray:
-    """The rig's step from a resting board's poses before the camera, before and after `steps` of them."""
+def _one_step(before: NDArray, after: NDArray, board: Board, T_range_camera: NDArray, options: CalibrateOptions) -> NDArray:
+    """The rig's step from a resting board's poses before the camera, before and after some steps."""
     T_before_after = before @ inverse(after)
     if rotation_angle(T_before_after[:3, :3]) < PURE_SHIFT_RAD:
         middle = board.corners.mean(axis=0)
         shift = apply(before, middle) - apply(after, middle)
-        return transform(None, T_range_camera[:3, :3] @ shift / steps)
+        length = np.linalg.norm(shift) / options.steps
+        if not length > LEAST_STEP_M:
+            raise BadInput(
+                f"the board moved by {1e3 * length * options.steps:.3f} mm only before the camera, so the rig's step is not known."
+            )
+        return transform(
+            None, T_range_camera[:3, :3] @ shift / options.steps * (1.0 if options.step_m is None else options.step_m / length)
+        )
     T_range = T_range_camera @ T_before_after @ inverse(T_range_camera)
-    step = np.real(expm(np.asarray(logm(T_range)) / steps))
+    step = np.real(expm(np.asarray(logm(T_range)) / options.steps))
     u, _, vh = np.linalg.svd(step[:3, :3])
     return transform(u @ vh, step[:3, 3])

@@ -42,8 +42,7 @@ def fuse_readings(area: ScanArea, points_range: NDArray, viewpoints: tuple[NDArr
     """
     kept = inside(area, points_range)
     points = points_range[kept]
-    elevation, readings = _elevation(area, points)
-    elevation = _without_pinholes(_without_specks(elevation, SPECK_SLOPE * area.cell), PINHOLE_SLOPE * area.cell)
+    elevation, readings = elevations(area, points)
     ends = [view[kept] if view.ndim == 2 else np.broadcast_to(view, points.shape) for view in viewpoints]
     starts = np.concatenate([points] * len(ends)) if ends else np.zeros((0, 3))
     return DepthMap(
@@ -64,8 +63,11 @@ def inside(area: ScanArea, points_range: NDArray) -> NDArray:
         return (x >= 0) & (x < nx) & (y >= 0) & (y < ny) & (np.abs(points_range[:, 2]) <= area.max_height)
 
 
-def _elevation(area: ScanArea, points: NDArray) -> tuple[NDArray, float]:
-    """Mean height [m] of each cell's highest surface, NaN without a reading, and the median number of readings a cell."""
+def elevations(area: ScanArea, points: NDArray) -> tuple[NDArray, float]:
+    """Mean height [m] of each cell's highest surface, NaN where nothing was read, and the median number of readings a cell.
+
+    The points (n, 3) [m] lie inside the area. Specks are taken out and pinholes filled.
+    """
     ny, nx = area.shape
     i, j = (np.floor(points[:, k] / area.cell).astype(int) for k in (0, 1))
     number, z = j * nx + i, points[:, 2]
@@ -76,7 +78,8 @@ def _elevation(area: ScanArea, points: NDArray) -> tuple[NDArray, float]:
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.bincount(number[top], weights=z[top], minlength=ny * nx) / count
     readings = max(1.0, float(np.median(count[count > 0]))) if len(points) else 1.0
-    return mean.reshape(ny, nx), readings
+    grid = _without_specks(mean.reshape(ny, nx), SPECK_SLOPE * area.cell)
+    return _without_pinholes(grid, PINHOLE_SLOPE * area.cell), readings
 
 
 def _without_specks(elevation: NDArray, tolerance: float) -> NDArray:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from handey_studio.base import BadInput, Progress, Share, Silent
 from handey_studio.geometry.transforms import apply, transform
@@ -23,6 +24,8 @@ MAX_POINTS = 20_000_000
 SPAN = (0.002, 0.998)  # quantiles of the readings that a depth map without a given area spans
 LEAST_NOISE_M = 1e-5
 NUDGE_PX = 0.25  # by which a peak is moved to see how far its point moves
+MAX_CELL_M = 0.02
+SPACING_LOOKS = 40  # photographs, and points of each, by which the stripes' spacing is measured
 GRAZING = "grazing the plane"
 
 
@@ -197,7 +200,7 @@ def reading_noise(looks: Sequence[Look]) -> tuple[float, float]:
 
 def depth_map_of(scan: Scan, instrument: Instrument) -> DepthMap:
     """The paper's depth map of a scan, over the instrument's area or over its readings. Raises BadInput without readings."""
-    instrument, T_area_range = _with_area(scan, instrument)
+    instrument, T_area_range = with_area(scan, instrument)
     counts = [len(look.points) for look in scan.looks]
     places = [np.array([look.eye for look in scan.looks])]
     if instrument.laser is not None:
@@ -215,20 +218,36 @@ def scan_area(instrument: Instrument, noise: float) -> ScanArea:
 
 def outside_area(scan: Scan, instrument: Instrument) -> int:
     """How many readings fall outside of the depth map."""
-    instrument, T_area_range = _with_area(scan, instrument)
+    instrument, T_area_range = with_area(scan, instrument)
     return int((~inside(scan_area(instrument, scan.noise), apply(T_area_range, scan.points_range))).sum())
 
 
-def _with_area(scan: Scan, instrument: Instrument) -> tuple[Instrument, NDArray]:
-    """The instrument with an area, and the shift of the range frame's origin to its corner."""
+def with_area(scan: Scan, instrument: Instrument) -> tuple[Instrument, NDArray]:
+    """The instrument with an area, and the shift (4, 4) of readings into its range frame: as they are, where the area is given.
+
+    Else the area is what the readings span, from a corner of theirs, in cells no smaller than from one stripe to the next.
+    """
     points = scan.points_range
     if not len(points):
         raise BadInput("the scan has no reading, so there is no depth map.")
     if instrument.area is not None:
         return instrument, np.eye(4)
     low, high = np.quantile(points[:, :2], SPAN, axis=0)
-    corner = (np.floor(low / instrument.cell) - 2) * instrument.cell
-    sides = np.clip(np.ceil((high - corner) / instrument.cell) + 2, 1, MAX_SIDE_CELLS) * instrument.cell
+    least = max(instrument.cell, round(stripe_spacing(scan), 4), float((high - low).max()) / (MAX_SIDE_CELLS - 8))
+    cell = min(least, MAX_CELL_M)
+    corner = (np.floor(low / cell) - 2) * cell
+    sides = np.clip(np.ceil((high - corner) / cell) + 2, 1, MAX_SIDE_CELLS) * cell
     T_world_area = instrument.T_world_range @ transform(None, (corner[0], corner[1], 0.0))
-    moved = replace(instrument, area=(float(sides[0]), float(sides[1])), T_world_range=T_world_area)
+    moved = replace(instrument, area=(float(sides[0]), float(sides[1])), cell=cell, T_world_range=T_world_area)
     return moved, transform(None, (-corner[0], -corner[1], 0.0))
+
+
+def stripe_spacing(scan: Scan) -> float:
+    """The median distance [m] across the range frame's plane from one photograph's stripe to the next's; 0 with a single stripe."""
+    spacings = []
+    steps = max(1, len(scan.looks) // SPACING_LOOKS)
+    for one, after in list(zip(scan.looks[:-1], scan.looks[1:], strict=True))[::steps]:
+        if len(one.points) and len(after.points):
+            away, _ = KDTree(after.points[:, :2]).query(one.points[:: max(1, len(one.points) // SPACING_LOOKS), :2])
+            spacings.append(float(np.median(away)))
+    return float(np.median(spacings)) if spacings else 0.0
