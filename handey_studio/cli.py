@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 
 # Each command imports the rooms that it needs when it runs: together they take seconds to load.
 DONE, FAILED, BAD_INPUT, NOTHING_FOUND = 0, 1, 2, 3
+SCAN_CALIBRATE = (
+    "camera and laser plane from photographs of a flat board: NAME.png shows the board, NAME.laser.png the same with the laser on "
+    "(without such partners the stripe is looked for in the board's photographs), NAME.moved.png the same board after the rig's steps"
+)
+TWO_WORDS = ("scan calibrate", "scan simulate")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -33,7 +38,7 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; the exit status: 0 done, 1 a MOVE failed, 2 bad input, 3 nothing found."""
     try:
-        given = _parser().parse_args(arguments)
+        given = _parser().parse_args(_words(sys.argv[1:] if arguments is None else arguments))
         return given.run(given)
     except BadInput as error:
         print(error, file=sys.stderr)
@@ -41,6 +46,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("stopped.", file=sys.stderr)
         return 130
+
+
+def _words(arguments: Sequence[str]) -> list[str]:
+    """The arguments, a command of two words as one: a folder that is called calibrate is ./calibrate."""
+    two = " ".join(arguments[:2])
+    return [two, *arguments[2:]] if two in TWO_WORDS else list(arguments)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -58,6 +69,9 @@ def _parser() -> argparse.ArgumentParser:
     studio.add_argument("--host", default="127.0.0.1", help="address to listen on (default: 127.0.0.1, this machine only)")
     studio.add_argument("--port", type=_port, default=8080, help="port to listen on (default: 8080)")
     _locate_arguments(command("locate", _locate, "find known parts in a depth image"))
+    _scan_arguments(command("scan", _scan, "triangulate a folder of laser-stripe photographs into a cloud and a depth map"))
+    _scan_calibrate_arguments(command("scan calibrate", _scan_calibrate, SCAN_CALIBRATE))
+    _scan_simulate_arguments(command("scan simulate", _scan_simulate, "photographs of a session's scene, to try scan and calibrate on"))
     for name, run, text in (
         ("move", _move, "run a session's MOVEs: sense, plan, execute"),
         ("plan", _plan, "the same, but stop before executing"),
@@ -91,6 +105,51 @@ def _locate_arguments(locate: argparse.ArgumentParser) -> None:
     locate.add_argument("--max-poses", type=_positive, default=5, help="at most this many of each part (default: 5)")
     locate.add_argument("--seed", type=int, default=0)
     locate.add_argument("--json", required=True, type=Path, help="where the poses go")
+
+
+def _scan_arguments(scan: argparse.ArgumentParser) -> None:
+    scan.add_argument(
+        "folder", type=Path, help="the photographs, png or jpg, in the order of their names; NAME.dark.png or dark.png: laser off"
+    )
+    scan.add_argument("--calibration", required=True, type=Path, help="the range finder's file (from scan calibrate, or written by hand)")
+    scan.add_argument("--dark", type=Path, help="the dark frame of photographs without one of their own")
+    scan.add_argument("--cloud", type=Path, metavar="OUT.ply", help="where the readings go, in metres, in the world's frame")
+    scan.add_argument(
+        "--depth", type=Path, metavar="OUT", help=".npy or .png: depth image for locate, its camera beside it; .npz: depth map"
+    )
+    scan.add_argument("--json", type=Path, help="where the counts, the noise and the timing go")
+    scan.add_argument("--channel", default="auto", help="the laser's colour: auto, red, green, blue or grey (default: auto)")
+    scan.add_argument("--stripe", default="auto", help="how the stripe runs through the photographs: auto, down or across (default: auto)")
+    scan.add_argument("--cell-mm", type=float, help="side of the depth map's cells (default: the file's, or the stripes' spacing)")
+
+
+def _scan_calibrate_arguments(calibrate: argparse.ArgumentParser) -> None:
+    calibrate.add_argument("folder", type=Path, help="the board's photographs: at least 3 poses, tilted both ways by some 30°")
+    calibrate.add_argument(
+        "--board", required=True, type=_board_size, metavar="COLSxROWS", help="its INNER corners: 10 × 7 squares have 9x6"
+    )
+    calibrate.add_argument("--square-mm", required=True, type=float, help="side of a square; between circles, their distance")
+    calibrate.add_argument("--out", required=True, type=Path, help="where the range finder's file goes")
+    calibrate.add_argument("--pattern", default="chessboard", help="chessboard or circles (a square grid of dots; default: chessboard)")
+    calibrate.add_argument("--camera", type=Path, help="a range finder's file whose camera is kept; only the laser is calibrated")
+    calibrate.add_argument("--table", metavar="NAME", help="photograph whose board is z = 0 of the range frame (default: the first)")
+    calibrate.add_argument("--moved-steps", type=_positive, default=1, help="steps of the rig from NAME to NAME.moved (default: 1)")
+    calibrate.add_argument("--step-mm", type=float, help="length of a step, where it is known better than photographs tell")
+    calibrate.add_argument("--channel", default="auto", help="the laser's colour: auto, red, green, blue or grey (default: auto)")
+
+
+def _scan_simulate_arguments(simulate: argparse.ArgumentParser) -> None:
+    simulate.add_argument("session", help="a session file, or its name in a library")
+    simulate.add_argument(
+        "--out", required=True, type=Path, help="the folder to make, with boards/, stripes/ and the true range finder's file"
+    )
+    simulate.add_argument(
+        "--rig", choices=("stage", "sweep"), default="stage", help="stage: one moving camera with a lens; sweep: the cell's own"
+    )
+    simulate.add_argument("--stripes", type=_positive, default=100, help="photographs of stripes (default: 100)")
+    simulate.add_argument("--boards", type=_positive, default=10, help="poses of the chessboard, 9x6 corners of 20 mm (default: 10)")
+    simulate.add_argument("--laser", default="red", help="red, green or grey (default: red)")
+    simulate.add_argument("--seed", type=int, default=0)
 
 
 def _move_arguments(move: argparse.ArgumentParser) -> None:
@@ -140,6 +199,87 @@ def _locate(given: argparse.Namespace) -> int:
         print(
             f"{pose.part} at {x:.4f}, {y:.4f}, {z:.4f} m, score {pose.score:.2f}, {pose.edges_found} of {pose.edges_predicted} edges found"
         )
+    return DONE
+
+
+def _scan(given: argparse.Namespace) -> int:
+    from handey_studio.cell.recorded import write_depth_map
+    from handey_studio.geometry.transforms import apply
+    from handey_studio.sensing.instrument_file import read_instrument
+    from handey_studio.sensing.scan import ScanOptions, depth_map_of, scan_folder
+    from handey_studio.sensing.scan_files import scan_view, write_cloud, write_view
+    from handey_studio.sensing.scan_report import scan_lines, scan_report
+
+    for output in (given.cloud, given.depth, given.json):
+        _check_output(output)
+    _check_suffix(given.cloud, ".ply")
+    _check_suffix(given.depth, ".npy", ".png", ".npz")
+    instrument = read_instrument(given.calibration)
+    if given.cell_mm is not None:
+        instrument = replace(instrument, cell=1e-3 * given.cell_mm)
+    begun = time.perf_counter()
+    scan = scan_folder(given.folder, instrument, given.dark, ScanOptions(given.channel, given.stripe), _Lines())
+    timing = {"scan": time.perf_counter() - begun}
+    depth_map = depth_map_of(scan, instrument) if len(scan.points_range) else None
+    timing["fuse"] = time.perf_counter() - begun - timing["scan"]
+    report = scan_report(scan, instrument, depth_map, timing)
+    if given.json:
+        _write_json(given.json, report)
+    print("\n".join(scan_lines(report)))
+    if depth_map is None:
+        print(
+            f'no stripe was read in the photographs of "{given.folder}"; try --channel or --stripe, or give a dark frame.', file=sys.stderr
+        )
+        return NOTHING_FOUND
+    if given.cloud:
+        write_cloud(given.cloud, apply(instrument.T_world_range, scan.points_range))
+    if given.depth and given.depth.suffix.lower() == ".npz":
+        write_depth_map(given.depth, depth_map)
+    elif given.depth:
+        write_view(given.depth, scan_view(scan, instrument))
+    return DONE
+
+
+def _scan_calibrate(given: argparse.Namespace) -> int:
+    from handey_studio.sensing.board import Board
+    from handey_studio.sensing.calibrate import CalibrateOptions, calibrate
+    from handey_studio.sensing.instrument_file import read_instrument, write_instrument
+    from handey_studio.sensing.scan_report import calibration_lines, calibration_report
+
+    _check_output(given.out)
+    board = Board(given.board[0], given.board[1], 1e-3 * given.square_mm, given.pattern)
+    camera = None if given.camera is None else read_instrument(given.camera).cameras[0]
+    step_m = None if given.step_mm is None else 1e-3 * given.step_mm
+    options = CalibrateOptions(given.channel, given.table, given.moved_steps, step_m)
+    found = calibrate(given.folder, board, camera, options, _Lines())
+    report = calibration_report(found)
+    try:
+        write_instrument(given.out, found.instrument, report)
+    except OSError as error:
+        raise BadInput(f'"{given.out}" cannot be written: {error.strerror}.') from None
+    print("\n".join(calibration_lines(report)))
+    return DONE
+
+
+def _scan_simulate(given: argparse.Namespace) -> int:
+    from handey_studio.cell.photographs import Exposure
+    from handey_studio.cell.scan_folders import FolderOptions, moved_steps, write_stage_folder, write_sweep_folder
+    from handey_studio.session import find_session, read_session
+    from handey_studio.session.run import cell_of
+
+    library = Library.choose(given.library)
+    session = read_session(find_session(library, given.session))
+    options = FolderOptions(given.stripes, given.boards, Exposure(colour=given.laser))
+    write = write_stage_folder if given.rig == "stage" else write_sweep_folder
+    _check_output(given.out)
+    bodies, rng = cell_of(session, library).true_scene(), np.random.default_rng(given.seed)
+    made = write(given.out, session.workcell.finder, bodies, options, rng, _Lines())
+    true = given.out / "true-range-finder.json"
+    print(f"{given.stripes} stripes for each of {len(made.cameras)} cameras in {given.out / 'stripes'}; now try")
+    if given.rig == "stage":
+        steps = f"--moved-steps {moved_steps(made)}"
+        print(f"  handey scan calibrate {given.out / 'boards'} --board 9x6 --square-mm 20 {steps} --out finder.json")
+    print(f"  handey scan {given.out / 'stripes'} --calibration {'finder.json' if given.rig == 'stage' else true} --cloud cloud.ply")
     return DONE
 
 
@@ -258,6 +398,19 @@ def _check_output(path: Path | None) -> None:
     """Raises BadInput before any work is done when there is no folder to write into."""
     if path is not None and not path.parent.is_dir():
         raise BadInput(f'"{path}" cannot be written: the folder "{path.parent}" does not exist.')
+
+
+def _check_suffix(path: Path | None, *allowed: str) -> None:
+    """Raises BadInput before any work is done for a file that would be of no known kind."""
+    if path is not None and path.suffix.lower() not in allowed:
+        raise BadInput(f'"{path}" has the suffix "{path.suffix}"; it must be one of {", ".join(allowed)}.')
+
+
+def _board_size(text: str) -> tuple[int, int]:
+    columns, _, rows = text.lower().partition("x")
+    if not (columns.isdigit() and rows.isdigit()):
+        raise argparse.ArgumentTypeError(f'"{text}" is not COLSxROWS, the numbers of inner corners, such as 9x6')
+    return int(columns), int(rows)
 
 
 def _port(text: str) -> int:

@@ -30,7 +30,8 @@ def test_there_are_commands_to_check():
 @pytest.mark.parametrize("line", shell_lines())
 def test_every_shell_command_is_understood(line):
     words = shlex.split(re.sub(r"[\[\]]", "", line.replace("[SESSION]", "figure1")))
-    assert cli._parser().parse_args(words[1:]).command == words[1]
+    command = cli._parser().parse_args(cli._words(words[1:])).command
+    assert words[1 : 1 + len(command.split())] == command.split()
 
 
 def test_the_python_example_moves_the_block(capsys):

@@ -1,4 +1,4 @@
-"""What a scan leaves in files: the cloud, the depth image in the camera's own view, and the report."""
+"""What a scan leaves in files: the cloud, and the depth image in the camera's own view."""
 
 import json
 from pathlib import Path
@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from handey_studio.base import BadInput
 from handey_studio.base.files import replace_file
 from handey_studio.geometry.transforms import apply, inverse
-from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.sensing.depth_view import DepthView, Pinhole
 from handey_studio.sensing.fusing import ScanArea, elevations
 from handey_studio.sensing.instrument import Instrument
-from handey_studio.sensing.scan import Scan, outside_area, with_area
+from handey_studio.sensing.scan import Scan, with_area
 
 DEPTH_SCALE_MM = 0.1  # of a raw step of a 16-bit depth image: 6.5 m fit
 MAX_SIDE_PX = 4096
@@ -77,31 +76,3 @@ def _camera(view: DepthView) -> dict[str, Any]:
     height, width = view.depth.shape
     lens = {key: getattr(view.projection, key) for key in ("fx", "fy", "cx", "cy")}
     return lens | {"width": width, "height": height, "depth_scale": DEPTH_SCALE_MM, "T_world_sensor": view.T_world_sensor.tolist()}
-
-
-def scan_report(scan: Scan, instrument: Instrument, depth_map: DepthMap | None, timing: dict[str, float]) -> dict[str, Any]:
-    """The scan as plain JSON, schema `handey/scan/1`; `depth_map` is None when nothing was read."""
-    report: dict[str, Any] = {
-        "schema": "handey/scan/1",
-        "photographs": len(scan.looks),
-        "stripes": scan.stripes,
-        "points": len(scan.points_range),
-        "dropped": scan.dropped,
-        "noise_px": scan.noise_px,
-        "noise_m": scan.noise,
-        "cameras": [
-            {"name": name, "laser": colour.name, "stripes_run": direction}
-            for name, colour, direction in zip(instrument.names, scan.colours, scan.directions, strict=True)
-        ],
-        "depth_map": None,
-        "timing_s": timing,
-    }
-    if depth_map is not None:
-        report["outside_area"] = outside_area(scan, instrument)
-        report["depth_map"] = {
-            "shape": list(depth_map.elevation.shape),
-            "cell_m": depth_map.cell,
-            "read_share": float(np.isfinite(depth_map.elevation).mean()),
-            "T_world_range": depth_map.T_world_range.tolist(),
-        }
-    return report
