@@ -97,7 +97,8 @@ def passes(look: dict[str, float]) -> bool:
 
 def _outline_mm(shown: NDArray, label: NDArray, view: DepthView) -> float:
     """Mean distance between two outlines in mm: the area between them over the label's outline."""
-    rim = label & ~binary_erosion(binary_fill_holes(label), border_value=1)
+    inside = np.asarray(binary_erosion(np.asarray(binary_fill_holes(label)), border_value=1), dtype=bool)
+    rim = label & ~inside
     if not rim.any():
         return np.inf
     pixels_per_metre = float(np.mean(view.projection.pixels_per_metre(float(np.median(view.depth[label])))))

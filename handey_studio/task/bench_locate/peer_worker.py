@@ -19,7 +19,8 @@ RANSAC_TRIALS = 400_000
 PPF_STEP = (
     0.1  # of the diameter, between sampled points and in distances; pairs on flat faces fill one hash chain: at 0.05 a cuboid takes minutes
 )
-PPF_POSES = 10  # the best clusters that are refined
+PPF_VOXEL_M = 0.0025  # between points of the scene, and of the model that poses are refined with
+PPF_POSES = 30  # the best clusters that are refined
 SCENE_VOXELS = 0.5  # points of the scene that poses are refined on, in voxels apart
 
 
@@ -99,10 +100,11 @@ class PointPairs:
 
     def locate(self, model: Any, points: NDArray) -> tuple[NDArray, float]:
         detector, cloud = model
-        millimetres = 1e3 * points
-        thinned = millimetres[first_of_voxels(millimetres, self.voxel)].astype(np.float32)
-        _, scene = self.cv2.ppf_match_3d.computeNormalsPC3d(thinned, 12, True, (0.0, 0.0, 0.0))
-        found = detector.match(scene, 0.2, PPF_STEP)
+        middle = 1e3 * points.mean(axis=0)  # poses are averaged in clusters, which goes astray far from the origin
+        thinned = 1e3 * points - middle
+        thinned = thinned[first_of_voxels(thinned, self.voxel)].astype(np.float32)
+        _, scene = self.cv2.ppf_match_3d.computeNormalsPC3d(thinned, 12, True, tuple(-middle))
+        found = detector.match(scene, 1.0, PPF_STEP)
         if not len(found):
             return np.eye(4), 0.0
         _, refined = self.cv2.ppf_match_3d.ICP(100, 0.005, 2.5, 8).registerModelToScene(cloud, scene, list(found[:PPF_POSES]))
@@ -110,7 +112,7 @@ class PointPairs:
         shares = [share_on(cloud[:, :3] @ T[:3, :3].T + T[:3, 3], thinned, self.voxel) for T in poses]
         best = int(np.argmax(shares))
         T = poses[best].copy()
-        T[:3, 3] *= 1e-3
+        T[:3, 3] = 1e-3 * (T[:3, 3] + middle)
         return T, shares[best]
 
 
@@ -123,8 +125,8 @@ def share_on(points: NDArray, scene: NDArray, voxel: float) -> float:
     """Share of points (n, 3) whose voxel, or a neighbouring one, holds a point of the scene (m, 3)."""
     cells = {tuple(cell) for cell in np.floor(scene / voxel).astype(int).tolist()}
     around = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)]
-    held = (any((x + i, y + j, z + k) in cells for i, j, k in around) for x, y, z in np.floor(points / voxel).astype(int).tolist())
-    return float(np.mean(list(held)))
+    near = (any((x + i, y + j, z + k) in cells for i, j, k in around) for x, y, z in np.floor(points / voxel).astype(int).tolist())
+    return float(np.mean(list(near)))
 
 
 def peers(voxels_m: list[float]) -> dict[str, Peer]:
@@ -133,7 +135,7 @@ def peers(voxels_m: list[float]) -> dict[str, Peer]:
     if find_spec("open3d") is not None:
         found |= {f"open3d {1e3 * voxel:g} mm": Open3D(voxel) for voxel in voxels_m}
     if find_spec("cv2") is not None and hasattr(import_module("cv2"), "ppf_match_3d"):
-        found["opencv ppf"] = PointPairs(min(voxels_m))
+        found["opencv ppf"] = PointPairs(PPF_VOXEL_M)
     return found
 
 

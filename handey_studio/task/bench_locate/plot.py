@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from handey_studio.base import BadInput
-from handey_studio.task.bench_locate.summary import BIN
+from handey_studio.task.bench_locate.summary import BINS
 
 SUFFIXES = (".png", ".svg", ".pdf")
 COLOURS = ("#1b5e9e", "#d1741f", "#a8482e", "#5b7f3b", "#7a5195", "#4d4d4d")
@@ -55,7 +55,7 @@ def _recall(axes: Any, summary: dict[str, Any], colours: dict[str, str]) -> None
             _line(axes, numbers["bins"], "instances", colours[name], "--s", f"{name}, all instances")
     for cell in next(iter(summary.values()))["bins"]:
         text = f"{cell['instances']['count']}\n{cell['first']['count']}"
-        axes.annotate(text, (100 * (cell["from"] + BIN / 2), -15), ha="center", fontsize=7, color="#666666", annotation_clip=False)
+        axes.annotate(text, (100 * (cell["from"] + 0.5 / BINS), -15), ha="center", fontsize=7, color="#666666", annotation_clip=False)
     axes.axvline(25, color="#bbbbbb", lw=0.8)
     axes.axvline(50, color="#bbbbbb", lw=0.8)
     axes.set(title="recall by visible fraction (below: instances, questions)", xlim=(0, 100), ylim=(-18, 103))
@@ -65,7 +65,7 @@ def _recall(axes: Any, summary: dict[str, Any], colours: dict[str, str]) -> None
 
 
 def _line(axes: Any, bins: list[dict[str, Any]], kind: str, colour: str, style: str, label: str) -> None:
-    at = [100 * (cell["from"] + BIN / 2) for cell in bins]
+    at = [100 * (cell["from"] + 0.5 / BINS) for cell in bins]
     shares = [np.nan if cell[kind]["share"] is None else 100 * cell[kind]["share"] for cell in bins]
     axes.plot(at, shares, style, color=colour, ms=4, lw=1.5, label=label, markerfacecolor=colour if style == "-o" else "white")
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 Row = dict[str, Any]
-BIN = 0.1
+BINS = 10  # of visible fraction
 COUNTED = 0.25  # instances with less of them visible count in no recall target, but finding them is not false
 PLAIN = 0.5
 
@@ -32,7 +32,7 @@ def _of_method(rows: Sequence[Row]) -> dict[str, Any]:
         "recall_plain_strict": _recall(rows, PLAIN, np.inf, "found_strict"),
         "first_plain": _first_recall(rows, PLAIN, np.inf),
         "first_half_hidden": _first_recall(rows, COUNTED, PLAIN),
-        "bins": [_bin(rows, k * BIN, (k + 1) * BIN) for k in range(round(1 / BIN))],
+        "bins": [_bin(rows, k / BINS, (k + 1) / BINS) for k in range(BINS)],
         "poses": len(poses),
         "precision": _share(pose["right"] for pose in poses),
         "false_share": _share(not pose["right"] for pose in poses),
@@ -44,9 +44,9 @@ def _of_method(rows: Sequence[Row]) -> dict[str, Any]:
 
 def _bin(rows: Sequence[Row], low: float, high: float) -> dict[str, Any]:
     """Recall of instances, and of first answers by the best visible instance of the part that was asked for."""
-    high = np.inf if high > 1.0 - 1e-9 else high
+    high = np.inf if high == 1.0 else high
     found, first = _recall(rows, low, high), _first_recall(rows, low, high)
-    return {"from": round(low, 3), "instances": found, "first": first}
+    return {"from": low, "instances": found, "first": first}
 
 
 def _recall(rows: Sequence[Row], low: float, high: float, found: str = "found") -> dict[str, Any]:
@@ -89,9 +89,9 @@ def table(summary: dict[str, Any]) -> list[str]:
     lines = [f"{'':34}" + "".join(f"{name:>{width}}" for name in names)]
     for text, value in _LINES:
         lines.append(f"{text:34}" + "".join(f"{value(summary[name]):>{width}}" for name in names))
-    if any(summary[name]["bins"][k]["instances"]["count"] for name in names for k in range(10)):
+    if any(summary[name]["bins"][k]["instances"]["count"] for name in names for k in range(BINS)):
         lines.append("recall by visible fraction: all instances, and the first answer by the part's best visible instance")
-        lines += [_bin_line(summary, k, width) for k in reversed(range(10))]
+        lines += [_bin_line(summary, k, width) for k in reversed(range(BINS))]
     return lines
 
 
