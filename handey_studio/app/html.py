@@ -58,6 +58,30 @@ def swatch(colour: palette.RGB, label: str) -> str:
     )
 
 
+def count_row(label: str, count: int, most: int, colour: palette.RGB) -> str:
+    """A label, a bar as long as its count's share of the most, and the count."""
+    width = max(3.0, 100.0 * count / max(most, 1))
+    clipped = "flex:0 0 62%;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
+    bar = f'<div style="width:{width:.0f}%;background:{css(colour)};height:8px;border-radius:3px"></div>'
+    return (
+        '<div style="display:flex;align-items:center;gap:8px;margin:2px 0">'
+        f'<div style="{clipped}" title="{esc(label)}">{esc(label)}</div>'
+        f'<div style="flex:1;background:#e6eaef;border-radius:3px">{bar}</div>'
+        f'<div style="flex:0 0 48px;text-align:right;font-variant-numeric:tabular-nums">{count}</div></div>'
+    )
+
+
+def hidden(elements: Iterable[str]) -> str:
+    """Takes buttons (elements' ids) off the page that only rows of a list press."""
+    rules = ", ".join(f'div:has(> [id="{esc(element)}"])' for element in elements if element)
+    return f"<style>{rules} {{ display: none }}</style>" if rules else ""
+
+
+def pressing(element: str) -> str:
+    """Script of a row that presses a button (an element's id)."""
+    return f"document.getElementById('{element}').click()"
+
+
 def figure(svg: str, chips: Iterable[tuple[palette.RGB, str]], words: str) -> str:
     """A picture, what its colours mean, and a sentence about it."""
     row = "".join(swatch(colour, label) for colour, label in chips)

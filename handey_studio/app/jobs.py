@@ -76,8 +76,14 @@ class JobStarted:
 
 
 def merged(shown: Session, found: Session) -> Session:
-    """What the planner found put into the session on screen, whose settings may have changed meanwhile."""
-    return replace(shown, scene=found.scene, results=found.results, cell_now=found.cell_now)
+    """What the planner found put into the session on screen, whose settings may have changed meanwhile.
+
+    A scene that came once more stays the one that is shown; of a new one nothing is looked at yet.
+    """
+    if found.scene == shown.scene:
+        return replace(shown, results=found.results, cell_now=found.cell_now)
+    view = replace(shown.view, hypothesis=-1, edge=-1)
+    return replace(shown, scene=found.scene, results=found.results, cell_now=found.cell_now, view=view)
 
 
 def outcome(result: MoveResult) -> str:

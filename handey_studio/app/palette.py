@@ -9,6 +9,7 @@ RGB = tuple[int, int, int]
 
 BLUE: RGB = (0, 96, 168)  # what the user sets: the destination
 SKY: RGB = (86, 180, 233)  # hypotheses
+PALE_SKY: RGB = (150, 200, 226)  # those that are not looked at
 UNSCANNED: RGB = (176, 182, 190)  # what stands in the cell and was not scanned yet
 LIGHT: RGB = (150, 186, 222)  # the edges of the laser's light
 ORANGE: RGB = (236, 142, 32)  # what was located: parts
@@ -25,6 +26,11 @@ FILLED: RGB = (154, 165, 177)
 TABLE: RGB = (226, 224, 219)
 FLOOR: RGB = (226, 230, 235)
 BLOCK: RGB = (168, 176, 186)
+
+JUMP: RGB = (196, 40, 140)  # data edges by kind
+CONVEX: RGB = INK
+CONCAVE: RGB = (150, 92, 16)
+FOUND, MISSING, HIDDEN = TEAL, VERMILLION, (150, 158, 168)  # predicted edges
 
 STEP_COLOURS: dict[str, RGB] = {
     "free": (122, 134, 148),
@@ -54,6 +60,10 @@ ELEVATION = np.array(
 )
 ELEVATION_AT = np.array([0.0, 0.04, 0.10, 0.30, 0.48, 0.66, 0.84, 1.0])
 
+# Residuals: behind the model blue, in front of it red, white where they agree.
+RESIDUAL = np.array([[33, 84, 172], [120, 166, 214], [247, 247, 247], [236, 138, 116], [178, 20, 43]], dtype=float)
+RESIDUAL_AT = np.linspace(-1.0, 1.0, len(RESIDUAL))
+
 
 def css(colour: Sequence[float]) -> str:
     """`#rrggbb`."""
@@ -62,5 +72,14 @@ def css(colour: Sequence[float]) -> str:
 
 def elevation_colours(share: NDArray) -> NDArray:
     """Colours (n, 3) uint8 for elevations (n,) as shares of the highest, in [0, 1]."""
-    share = np.clip(share, 0.0, 1.0)
-    return np.stack([np.interp(share, ELEVATION_AT, ELEVATION[:, k]) for k in range(3)], axis=-1).astype(np.uint8)
+    return _between(share, ELEVATION_AT, ELEVATION)
+
+
+def residual_colours(share: NDArray) -> NDArray:
+    """Colours (n, 3) uint8 for residuals (n,) as shares of their limit, in [-1, 1]; beyond it the colour stays."""
+    return _between(share, RESIDUAL_AT, RESIDUAL)
+
+
+def _between(share: NDArray, at: NDArray, colours: NDArray) -> NDArray:
+    """Colours (n, 3) uint8 between those that stand at given places; beyond the ends the last one."""
+    return np.stack([np.interp(share, at, colours[:, k]) for k in range(3)], axis=-1).astype(np.uint8)

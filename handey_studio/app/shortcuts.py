@@ -4,8 +4,8 @@ from typing import Any
 
 import viser
 
-from handey_studio.app.actions import CancelMove, LookFrom, SaveSession, StartMove
-from handey_studio.app.commands import Redo, Undo
+from handey_studio.app.actions import CancelMove, Follow, LookFrom, SaveSession, StartMove
+from handey_studio.app.commands import Browse, LookAt, Redo, Undo
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.playback import SeekStep, TogglePlay
 from handey_studio.app.wire import Send, on_trigger
@@ -21,15 +21,26 @@ KEYS: tuple[tuple[str, Any, Any, Any], ...] = (
     ("To the end", "end", None, SeekStep(99)),
     ("Plan", "P", None, StartMove(execute=False)),
     ("MOVE", "M", None, StartMove(execute=True)),
+    ("Look at no hypothesis", "0", None, LookAt(-1)),
     ("Cancel planning", "escape", None, CancelMove()),
 )
-VIEW_KEYS: tuple[tuple[Any, str], ...] = (("1", "Workcell"), ("2", "Pile"), ("3", "Top"), ("4", "Grasp"), ("5", "Hand"))
+BROWSE_KEYS: tuple[tuple[str, Any, int], ...] = (("Next hypothesis", "N", 1), ("Hypothesis before", "B", -1))
+VIEW_KEYS: tuple[tuple[Any, str], ...] = (
+    ("1", "Workcell"),
+    ("2", "Pile"),
+    ("3", "Top"),
+    ("4", "Grasp"),
+    ("5", "Hand"),
+    ("6", "Hypothesis"),
+)
 
 
 def add_shortcuts(gui: viser.GuiApi, send: Send, session: SessionPanel) -> None:
     """Register every command with its key."""
     for label, key, modifier, command in KEYS:
         on_trigger(gui.add_command(label, hotkey=key, modifier=modifier), send, lambda _, command=command: command)
+    for label, key, by in BROWSE_KEYS:
+        on_trigger(gui.add_command(label, hotkey=key), send, lambda event, by=by: Follow(Browse(by), event.client_id))
     for key, view in VIEW_KEYS:
         on_trigger(gui.add_command(f"Look: {view}", hotkey=key), send, lambda event, view=view: LookFrom(view, event.client_id))
     opening = gui.add_command("Open a session", hotkey="O", modifier="cmd/ctrl")

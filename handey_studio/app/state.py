@@ -4,8 +4,11 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
+from handey_studio.localization import Hypothesis
+from handey_studio.localization.explain import Explanation
 from handey_studio.session import Replay, Session
 from handey_studio.task.plan import MoveCommand
+from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Robot
 
 MAX_UNDO = 100
@@ -56,8 +59,20 @@ class Notice:
 
 
 @dataclass(frozen=True, eq=False)
+class Explained:
+    """What the depth map says to hypothesis `number` of a scene; `explanation` is None when nothing can be said."""
+
+    scene: Scene
+    number: int
+    explanation: Explanation | None
+
+
+@dataclass(frozen=True, eq=False)
 class State:
-    """Everything that the screen shows. `saved` is the session as it is on disk at `path`."""
+    """Everything that the screen shows. `saved` is the session as it is on disk at `path`.
+
+    `hypothesis_part`, `hypothesis_verdict` and `edge_min_m` narrow down what of the localizer's work is looked at.
+    """
 
     library: Library
     session: Session
@@ -76,6 +91,10 @@ class State:
     ledger_stage: str = ""
     ledger_only: str = "all"
     ledger_words: str = ""
+    hypothesis_part: str = ""
+    hypothesis_verdict: str = ""
+    edge_min_m: float = 0.0
+    explained: Explained | None = None
     loads: int = field(default=0)
 
     @property
@@ -85,6 +104,21 @@ class State:
         if result is None or result.plan is None or not result.plan.steps:
             return None
         return _replay(self.robot, result.plan)
+
+    @property
+    def hypothesis(self) -> Hypothesis | None:
+        """The hypothesis that is looked at."""
+        scene, number = self.session.scene, self.session.view.hypothesis
+        known = scene.located.hypotheses if scene else ()
+        return known[number] if 0 <= number < len(known) else None
+
+    @property
+    def explanation(self) -> Explanation | None:
+        """What the depth map says to it, None while that is being worked out."""
+        said, session = self.explained, self.session
+        if said is None or said.scene is not session.scene or said.number != session.view.hypothesis:
+            return None
+        return said.explanation
 
     @property
     def unsaved(self) -> bool:

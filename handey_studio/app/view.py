@@ -5,6 +5,7 @@ from typing import Any, Protocol
 import viser
 
 from handey_studio.app import palette
+from handey_studio.app.panels.edges import EdgesPanel
 from handey_studio.app.panels.findings import GraspPanel, PathPanel, ResultPanel
 from handey_studio.app.panels.ledger import LedgerPanel
 from handey_studio.app.panels.looking import LookingPanel
@@ -15,6 +16,8 @@ from handey_studio.app.panels.timeline import TimelinePanel
 from handey_studio.app.scene.depth import DepthScene
 from handey_studio.app.scene.destination import DestinationScene
 from handey_studio.app.scene.findings import PlanScene
+from handey_studio.app.scene.hypothesis import HypothesisScene
+from handey_studio.app.scene.pair import PairScene
 from handey_studio.app.scene.parts import PartsScene
 from handey_studio.app.scene.pile import PileScene
 from handey_studio.app.scene.robot import RobotScene
@@ -40,7 +43,8 @@ class View:
         self._server = server
         server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
         scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server, send)]
-        scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), PlanScene(server)]
+        scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), HypothesisScene(server)]
+        scenes += [PairScene(server), PlanScene(server)]
         session = SessionPanel(server, send)
         self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()
@@ -59,9 +63,11 @@ def _left(gui: viser.GuiApi, send: Send) -> list[Any]:
         move = MovePanel(gui, send)
     with panel.add_tab("View", viser.Icon.EYE):
         looking = LookingPanel(gui, send)
+    with panel.add_tab("Edges", viser.Icon.LINE):
+        edges = EdgesPanel(gui, send)
     panel.dock_left()
     panel.set_width(LEFT_WIDTH)
-    return [move, looking]
+    return [move, looking, edges]
 
 
 def _right(gui: viser.GuiApi, send: Send) -> list[Any]:

@@ -65,6 +65,11 @@ def on_trigger(command: Any, send: Send, make: Callable[[Any], Any]) -> None:
     command.on_trigger(fired)
 
 
+def element_id(handle: Any) -> str:
+    """The id of a button in the page, empty when this version of viser has none."""
+    return str(getattr(getattr(handle, "_impl", None), "uuid", ""))
+
+
 def set_to(handle: Any, **properties: Any) -> None:
     """Assign only what differs, so that nothing is sent for nothing."""
     for key, value in properties.items():

@@ -13,6 +13,7 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app.commands import CameraMoved, Tell, Viewers
+from handey_studio.app.explaining import Explainer
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows
 from handey_studio.app.palette import BLUE, TEAL, VERMILLION
 from handey_studio.app.planner import Failed, Finished, Planner, Progressed, Run, Shown
@@ -46,9 +47,11 @@ class Workbench:
         self._running = threading.Event()
         self._running.set()
         self.planner = Planner(run, lambda message: self.send(heard(message)), prepare)
+        self._explainer = Explainer(self.send)
         self._view = View(server, self.send)
         self._start_from(session.view.camera_position, session.view.camera_look_at)
         self._view.render(None, self.state)
+        self._explainer.follow(self.state)
         server.on_client_connect(self._arrived)
         server.on_client_disconnect(lambda _: self.send(Viewers(-1)))
         self._thread = threading.Thread(target=self._loop, name="workbench", daemon=True)
@@ -62,6 +65,7 @@ class Workbench:
         self._running.clear()
         self._commands.put(None)
         self._thread.join(timeout=10)
+        self._explainer.stop()
         self.planner.stop()
         self.server.stop()
 
@@ -116,6 +120,7 @@ class Workbench:
         for command in commands:
             self.state = self._next(command)
         self._view.render(old, self.state)
+        self._explainer.follow(self.state)
         self._notify(old)
 
     def _next(self, command: Any) -> State:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.lines import PARALLEL_SIN, nearest_end, relative_pose
+from handey_studio.localization.pairs import MIN_ALPHA
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,6 +17,9 @@ class EdgePair(Value):
     `alpha` [rad] is the angle between the unit `directions` (2, 3), each of which looks from the base of the common perpendicular
     along its edge. `feet` (2, 3) [m] are the perpendicular's bases and `d` [m] its length, with a sign that tells the pair
     from its mirror image. `nearest` (2, 3) [m] are the ends nearest to the bases, `a` (2,) [m] the distances to them: a₁ and a₂.
+
+    Of edges that are nearly parallel the base would be anywhere: the perpendicular at the first edge's middle is taken, `d` has no
+    sign, and a₁ and a₂ mean nothing (NaN; `nearest` are the bases).
     """
 
     ends: NDArray
@@ -30,6 +34,11 @@ class EdgePair(Value):
         for key in ("ends", "directions", "feet", "nearest", "a"):
             object.__setattr__(self, key, frozen_array(getattr(self, key)))
 
+    @property
+    def parallel(self) -> bool:
+        """Whether the edges are taken for parallel."""
+        return bool(np.isnan(self.a).any())
+
     def arc(self, radius: float, points: int = 25) -> NDArray:
         """Points (n, 3) from the first edge's direction to the second's, `radius` [m] about the first base."""
         first, second = self.directions
@@ -43,7 +52,9 @@ class EdgePair(Value):
         bisector = self.directions.sum(axis=0)
         bisector = bisector / max(float(np.linalg.norm(bisector)), PARALLEL_SIN)
         base = self.feet.mean(axis=0)
-        at = {"α": self.feet[0] + 1.45 * radius * bisector, "d": base if abs(self.d) > 1.5 * radius else base - 0.7 * radius * bisector}
+        if self.parallel:
+            return {"α": self.feet[0] + 2.2 * radius * self.directions[0], "d": base}
+        at = {"α": self.feet[0] + 1.9 * radius * bisector, "d": base if abs(self.d) > 1.5 * radius else base - 0.7 * radius * bisector}
         for k, name in enumerate(("a1", "a2")):
             middle = (self.feet[k] + self.nearest[k]) / 2.0
             at[name] = middle if self.a[k] > 2.0 * radius else self.feet[k] + 2.2 * radius * self.directions[k]
@@ -59,7 +70,11 @@ def edge_pair(ends: NDArray, towards: NDArray | None = None) -> EdgePair:
     middle = ends.mean(axis=1)
     half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2.0
     direction = (ends[:, 1] - ends[:, 0]) / (2.0 * half[:, None])
+    if towards is None and direction[0] @ direction[1] < -np.cos(MIN_ALPHA):
+        direction[1] *= -1.0
     pose = relative_pose(middle[0], direction[0], middle[1], direction[1])
+    if np.sin(pose.alpha) < np.sin(MIN_ALPHA):
+        return _parallel(ends, middle, direction, towards)
     foot = np.array([pose.foot1, pose.foot2])
     turn = foot > 0.0 if towards is None else np.einsum("ki,ki->k", direction, towards) < 0.0
     sign = np.where(turn, -1.0, 1.0)
@@ -74,3 +89,15 @@ def edge_pair(ends: NDArray, towards: NDArray | None = None) -> EdgePair:
         turned * float(pose.d),
         nearest_end(foot, -half, half),
     )
+
+
+def _parallel(ends: NDArray, middle: NDArray, direction: NDArray, towards: NDArray | None) -> EdgePair:
+    """The pair of edges so nearly parallel that both take their mean direction for the perpendicular."""
+    if towards is not None:
+        direction = direction * np.where(np.einsum("ki,ki->k", direction, towards) < 0.0, -1.0, 1.0)[:, None]
+    along = direction[0] + np.sign(direction[0] @ direction[1]) * direction[1]
+    along /= np.linalg.norm(along)
+    between = middle[1] - middle[0]
+    feet = np.stack([middle[0], middle[1] - (between @ along) * along])
+    alpha = float(np.arctan2(np.linalg.norm(np.cross(direction[0], direction[1])), direction[0] @ direction[1]))
+    return EdgePair(ends, direction, feet, feet, alpha, float(np.linalg.norm(feet[1] - feet[0])), np.full(2, np.nan))

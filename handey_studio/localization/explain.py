@@ -159,7 +159,7 @@ def _pairs(
         edges, chosen = model_edges(part), np.array(model)
         reach = edges.half[chosen, None] * edges.direction[chosen]
         posed = edge_pair(apply(T_world_part, np.stack([edges.middle[chosen] - reach, edges.middle[chosen] + reach], axis=1)))
-    if len(data) != 2:
+    if len(data) != 2 or min(edge.length for edge in data) <= 0.0:
         return None, posed
     ends = np.array([edge.ends_world for edge in data])
     return edge_pair(ends, None if posed is None else posed.directions), posed

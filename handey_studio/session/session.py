@@ -12,7 +12,20 @@ from handey_studio.task.plan import MoveCommand, MoveResult
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Part, PlacedPart
 
-LAYERS = ("robot", "depth map", "located parts", "data edges", "hypothesis", "grasp", "hand path", "destination", "labels")
+LAYERS = (
+    "robot",
+    "depth map",
+    "located parts",
+    "data edges",
+    "hypothesis",
+    "other hypotheses",
+    "pair of edges",
+    "residuals",
+    "grasp",
+    "hand path",
+    "destination",
+    "labels",
+)
 
 
 @dataclass(frozen=True, eq=False)

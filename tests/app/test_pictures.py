@@ -11,7 +11,7 @@ from handey_studio.app.cspace import nearest, slice_svg
 from handey_studio.app.palette import elevation_colours
 from handey_studio.app.panels.findings import grasp_facts, result_html
 from handey_studio.app.panels.ledger import context, ledger_html
-from handey_studio.app.panels.sensing import edge_labels, found_html, hypothesis_labels, number_of, picked
+from handey_studio.app.panels.sensing import counted, found_html, picked, word_of
 from handey_studio.app.panels.timeline import strip
 from handey_studio.app.scene.depth import elevation_span, stride_of, thinned
 from handey_studio.app.svg import grasp_plane_svg
@@ -93,11 +93,12 @@ def test_the_ledger_groups_by_stage_and_says_what_an_entry_belongs_to():
     assert text.index("Destination") < text.index("Grasp group") < text.index("Approach") < text.index("Reach")
 
 
-def test_labels_lead_back_to_their_numbers(session):
-    for labels in (hypothesis_labels(session), edge_labels(session)):
-        assert [number_of(label) for label in labels] == list(range(-1, len(labels) - 1))
-        assert picked(labels, 99) == picked(labels, -1) == "none"
-        assert number_of(picked(labels, 1)) == 1
+def test_labels_lead_back_to_their_words():
+    labels = counted({"it fell (badly)": 3, "all": 1})
+    assert labels == ("all (4)", "it fell (badly) (3)", "all (1)")
+    assert word_of(labels[1]) == "it fell (badly)" and word_of(labels[0]) == ""
+    assert picked(labels, "it fell (badly)") == labels[1]
+    assert picked(labels, "") == picked(labels, "gone") == labels[0]
 
 
 def test_grasp_facts_speak_of_classes_and_angles(session):

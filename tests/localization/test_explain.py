@@ -132,7 +132,7 @@ ENDS = st.lists(st.floats(-0.2, 0.2), min_size=12, max_size=12).map(lambda x: np
 def skew(ends):
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
-    return lengths.min() > 0.01 and np.linalg.norm(np.cross(along[0] / lengths[0], along[1] / lengths[1])) > 0.1
+    return lengths.min() > 0.01 and np.linalg.norm(np.cross(along[0] / lengths[0], along[1] / lengths[1])) > 0.43
 
 
 @given(ENDS.filter(skew), st.integers(0, 2**31 - 1))
@@ -156,6 +156,21 @@ def test_figure_3_is_what_the_paper_defines(ends, seed):
     mirrored = edge_pair(ends * (1.0, 1.0, -1.0))
     for other, d in ((moved, pair.d), (swapped, pair.d), (mirrored, -pair.d)):
         np.testing.assert_allclose((other.alpha, other.d, *other.a), (pair.alpha, d, *pair.a), atol=1e-8)
+
+
+@given(st.floats(-0.2, 0.2), st.integers(0, 2**31 - 1))
+@settings(max_examples=40, deadline=None)
+def test_parallel_edges_have_a_distance_and_no_bases(tilt, seed):
+    ends = np.array(
+        [[[-0.04, 0.0, 0.0], [0.04, 0.0, 0.0]], [[0.06, 0.05, 0.01], [0.06 + 0.05 * np.cos(tilt), 0.05 + 0.05 * np.sin(tilt), 0.01]]]
+    )
+    T = transform(Rotation.random(None, np.random.default_rng(seed)).as_matrix(), (0.3, -0.2, 0.1))
+    for pair in (edge_pair(apply(T, ends)), edge_pair(apply(T, ends[:, ::-1])), edge_pair(apply(T, ends), T[:3, 0] * np.ones((2, 1)))):
+        assert pair.parallel and pair.alpha == pytest.approx(abs(tilt), abs=1e-6)
+        assert np.linalg.norm(pair.feet[1] - pair.feet[0]) == pytest.approx(pair.d) and pair.d > 0.0
+        assert set(pair.anchors(0.01)) == {"α", "d"}
+    if abs(tilt) < 1e-9:
+        assert pair.d == pytest.approx(np.hypot(0.05, 0.01))
 
 
 def test_names_stand_apart_even_at_a_shared_corner():

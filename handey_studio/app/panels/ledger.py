@@ -61,23 +61,11 @@ def ledger_html(entries: Sequence[Entry], whole: Sequence[Entry]) -> str:
     """Reasons by count, then rows grouped by stage. `whole` is the unfiltered ledger, which knows the entries' parents."""
     counts = list(rejected_counts(entries).items())
     most = max((count for _, count in counts), default=1)
-    bars = "".join(_count_row(reason, count, most) for reason, count in counts[:MAX_REASONS])
+    bars = "".join(html.count_row(reason, count, most, palette.VERMILLION) for reason, count in counts[:MAX_REASONS])
     head = f'<div style="color:#6b7684;margin:6px 0">{len(entries)} of {len(whole)} entries.</div>'
     return (
         f'<div data-testid="ledger" style="margin:4px 14px;font-size:12px;line-height:1.4">{bars}{head}'
         f'<div style="max-height:420px;overflow:auto">{_groups(entries, {entry.id: entry for entry in whole})}</div></div>'
-    )
-
-
-def _count_row(reason: str, count: int, most: int) -> str:
-    width = max(3.0, 100.0 * count / most)
-    clipped = "flex:0 0 62%;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
-    bar = f'<div style="width:{width:.0f}%;background:{css(palette.VERMILLION)};height:8px;border-radius:3px"></div>'
-    return (
-        '<div style="display:flex;align-items:center;gap:8px;margin:2px 0">'
-        f'<div style="{clipped}" title="{html.esc(reason)}">{html.esc(reason)}</div>'
-        f'<div style="flex:1;background:#e6eaef;border-radius:3px">{bar}</div>'
-        f'<div style="flex:0 0 34px;text-align:right;font-variant-numeric:tabular-nums">{count}</div></div>'
     )
 
 

@@ -7,15 +7,17 @@ from numpy.typing import NDArray
 from handey_studio.app.palette import elevation_colours
 from handey_studio.app.scene.units import scaled
 from handey_studio.app.state import State
+from handey_studio.localization.explain import Explanation
 from handey_studio.sensing.depth_map import DepthMap
-from handey_studio.session.looking import unexplained
+from handey_studio.session.looking import cells_of, unexplained
 
 MAX_POINTS = 50_000
 MIN_SPAN_M = 0.02  # an empty table is not blown up to mountains of noise
 
 
 class DepthScene:
-    """One point cloud, replaced when the scan changes. Readings that a located part explains go when the part is drawn."""
+    """One point cloud, replaced when the scan changes. Readings that a located part explains go when the part is drawn, those that
+    stand in colours of their own as well."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
@@ -38,6 +40,9 @@ class DepthScene:
             return
         scan = scene.depth_map
         left = unexplained(scene) if _parts_shown(state) else np.ones(scan.elevation.shape, dtype=bool)
+        said = _residuals_shown(state)
+        if said is not None:
+            left = left & ~cells_of(scan, said.readings_world)
         stride = stride_of(scan)
         points, elevation = thinned(scan, left, stride)
         self._cloud = self._server.scene.add_point_cloud(
@@ -52,11 +57,17 @@ class DepthScene:
 
 
 def _parts_shown(state: State) -> bool:
-    return "located parts" not in state.session.view.hidden_layers
+    """Whether located parts stand as solids; while a hypothesis is looked at, the readings beneath them are wanted."""
+    return "located parts" not in state.session.view.hidden_layers and state.hypothesis is None
+
+
+def _residuals_shown(state: State) -> Explanation | None:
+    """The explanation whose readings stand in the scene in colours of their own."""
+    return None if "residuals" in state.session.view.hidden_layers else state.explanation
 
 
 def _looks(state: State) -> tuple:
-    return id(state.session.scene), _parts_shown(state)
+    return id(state.session.scene), _parts_shown(state), id(_residuals_shown(state))
 
 
 def stride_of(scan: DepthMap) -> int:

@@ -39,6 +39,7 @@ class PartsScene:
         self._server, self._send = server, send
         self._frames: dict[str, viser.FrameHandle] = {}
         self._labels: dict[str, viser.LabelHandle] = {}
+        self._faces: dict[str, viser.MeshHandle] = {}
 
     def render(self, old: State | None, new: State) -> None:
         if old is None or old.session.located is not new.session.located:
@@ -51,10 +52,11 @@ class PartsScene:
         for frame in self._frames.values():
             frame.remove()
         scene = self._server.scene
-        self._frames, self._labels = {}, {}
+        self._frames, self._labels, self._faces = {}, {}, {}
         for number, placed in enumerate(state.session.located):
             name = f"{ROOT}/{number}"
             self._frames[placed.name], faces = add_solid(scene, name, placed.part, palette.ORANGE, placed.T_world_part)
+            self._faces[placed.name] = faces
             on_click(faces, self._send, lambda _, chosen=placed.name: ChoosePart(chosen))
             top = placed.part.solid.vertices.mean(axis=0)
             self._labels[placed.name] = scene.add_label(f"{name}/label", placed.name, position=scaled(top), font_screen_scale=0.75)
@@ -65,10 +67,12 @@ class PartsScene:
         for placed in state.session.located:
             moved = replay is not None and replay.plan.part == placed.name
             T = replay.at(state.session.view.time_s).T_world_part if replay is not None and moved else placed.T_world_part
+            moved = not np.allclose(T, placed.T_world_part, atol=1e-6)
             place(self._frames[placed.name], T)
             self._frames[placed.name].visible = "located parts" not in hidden
+            self._faces[placed.name].visible = moved or state.hypothesis is None  # readings are looked at beneath those that stand
             self._labels[placed.name].visible = "labels" not in hidden
 
 
 def _looks(state: State) -> tuple:
-    return state.session.result, state.session.view.time_s, state.session.view.hidden_layers
+    return state.session.result, state.session.view.time_s, state.session.view.hidden_layers, state.hypothesis is None
