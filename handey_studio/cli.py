@@ -92,6 +92,7 @@ def _bench_arguments(bench: argparse.ArgumentParser) -> None:
     locate.add_argument(
         "--scenes", type=Path, help="folder of scenes, simulated or labelled real ones; with --seeds, where simulated ones are kept"
     )
+    locate.add_argument("--sensor", choices=("camera", "range_finder"), default="camera", help="what sees new scenes (default: camera)")
     locate.add_argument("--peers", action="store_true", help="ask Open3D and OpenCV the same questions, as far as they are installed")
     locate.add_argument("--peer-python", metavar="PYTHON", help="interpreter of the environment that holds the peers (default: this one)")
     locate.add_argument("--plot", type=Path, help="draw recall, precision and time into a .png, .svg or .pdf")
@@ -377,10 +378,11 @@ def _bench_locate(given: argparse.Namespace) -> dict[str, Any]:
     _check_output(given.plot)
     return run_bench(
         Library.choose(given.library),
-        tell=lambda line: print(f"\r\033[K{line}" if sys.stderr.isatty() else line),
+        tell=lambda line: print(f"\r\033[K{line}" if sys.stderr.isatty() else line, flush=True),
         progress=_Lines(),
         seeds=given.seeds,
         scenes=given.scenes,
+        sensor=given.sensor,
         peers=given.peers,
         peer_python=given.peer_python,
         plot_to=given.plot,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from handey_studio.base import BadInput, Value, frozen_array
+from handey_studio.base.errors import unknown_name
 from handey_studio.cell.bodies import SolidBody, fixed_bodies
 from handey_studio.cell.camera import DepthCamera, Seen, SensorFaults, look_exactly, pixels_alone, with_faults
 from handey_studio.cell.physics import SettleOptions, settle
@@ -20,6 +21,7 @@ from handey_studio.sensing.depth_view import DepthView, Pinhole
 from handey_studio.sensing.range_finder import RangeFinder
 from handey_studio.world.library import Library
 
+CAMERA, RANGE_FINDER = SENSORS = ("camera", "range_finder")
 ATTEMPTS = 8  # piles that are tried until one comes to rest
 MAX_STEPS = 6000  # of physics until a wave of bodies must rest
 WAVE = 4  # bodies that fall at a time
@@ -39,7 +41,7 @@ class SceneOptions:
     sides: tuple[float, float] = (0.020, 0.070)
     spread: tuple[float, float] = (0.03, 0.17)
     absent: tuple[int, int] = (0, 2)
-    sensor: str = "camera"
+    sensor: str = CAMERA
     size_px: int = 512
     distance: tuple[float, float] = (0.5, 0.9)
     pixel: tuple[float, float] = (0.0008, 0.0012)
@@ -75,13 +77,13 @@ def random_scene(seed: int, library: Library, options: SceneOptions = SceneOptio
 
     Raises BadInput when no pile comes to rest.
     """
-    if options.sensor not in ("camera", "range_finder"):
-        raise BadInput(f'sensor "{options.sensor}" is not known; choose one of: camera, range_finder.')
+    if options.sensor not in SENSORS:
+        raise unknown_name("sensor", options.sensor, SENSORS)
     rng = np.random.default_rng(seed)
     bodies = next((pile for _ in range(ATTEMPTS) if (pile := _pile(library, rng, options))), ())
     if not bodies:
         raise BadInput(f"no pile of {options.bodies} bodies with seed {seed} comes to rest in {ATTEMPTS} attempts.")
-    eye, view = _photographed(bodies, rng, options) if options.sensor == "range_finder" else _seen(bodies, rng, options)
+    eye, view = _photographed(bodies, rng, options) if options.sensor == RANGE_FINDER else _seen(bodies, rng, options)
     exact = look_exactly(eye, bodies)
     truth = tuple(_true_pose(eye, exact, number, body) for number, body in enumerate(bodies) if body.name in library.part_files())
     clutter = tuple(body for body in bodies if body.name.startswith("clutter"))

@@ -212,13 +212,18 @@ def test_parts_of_simulated_scenes_are_found_from_their_files(library, tmp_path)
 
 def test_seeds_are_simulated_once_and_kept(library, tmp_path, monkeypatch):
     small = SceneOptions(bodies=2, size_px=64, clutter=(0, 0))
-    monkeypatch.setattr("handey_studio.task.bench_locate.labelled_scenes.random_scene", lambda seed, lib: random_scene(seed, lib, small))
+    monkeypatch.setattr(
+        "handey_studio.task.bench_locate.labelled_scenes.random_scene",
+        lambda seed, lib, options: random_scene(seed, lib, replace(small, sensor=options.sensor)),
+    )
     monkeypatch.setattr(command, "Handey", lambda: Told({}))
     report = run_bench(library, lambda line: None, Silent(), seeds=range(3, 5), scenes=tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0003", "0004"] and len(report["rows"]) == 12
     before = (tmp_path / "0003" / "depth.png").stat().st_mtime_ns
     run_bench(library, lambda line: None, Silent(), seeds=range(3, 4), scenes=tmp_path)
     assert (tmp_path / "0003" / "depth.png").stat().st_mtime_ns == before
+    run_bench(library, lambda line: None, Silent(), seeds=range(3, 4), scenes=tmp_path, sensor="range_finder")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["0003", "0003-range_finder", "0004"]
 
 
 # Peers.
@@ -325,3 +330,9 @@ def test_a_plot_is_drawn(judge, tmp_path):
     report = bench_locate([scene], [Told({("a", "brick"): [moved(HERE)]})], tell=lambda line: None)
     plot.plot(report["summary"], tmp_path / "plot.png")
     assert cv2.imread(str(tmp_path / "plot.png")).shape[1] > 1000
+
+
+def test_a_broken_list_of_objects_is_one_sentence(real_folder, library):
+    (real_folder / "scene1" / "objects.json").write_text('{"objects": [{"part": "tin"}]}')
+    with pytest.raises(BadInput, match="label and part"):
+        list(load_labelled(scene_folders(real_folder), library))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from handey_studio.base import Progress
+from handey_studio.cell.scenes import CAMERA
 from handey_studio.task.bench_locate.answers import Handey, Method
 from handey_studio.task.bench_locate.labelled_scenes import load_labelled, scene_folders, simulate
 from handey_studio.task.bench_locate.peers import Peer, PeerProcess
@@ -24,12 +25,13 @@ def run_bench(
     *,
     seeds: Iterable[int] | None = None,
     scenes: Path | None = None,
+    sensor: str = CAMERA,
     peers: bool = False,
     peer_python: str | None = None,
     plot_to: Path | None = None,
 ) -> dict[str, Any]:
-    """Measure and tell. Scenes are those in the folder `scenes`; with `seeds`, those seeds' simulated ones, made there if they are not yet;
-    without a folder they are made and forgotten. Raises BadInput, before any work where it can."""
+    """Measure and tell. Scenes are those in the folder `scenes`; with `seeds`, those seeds' simulated ones as `sensor` sees them, made
+    there if they are missing; without a folder they are made and forgotten. Raises BadInput, before any work where it can."""
     check_plot(plot_to)
     with ExitStack() as open_things:
         methods: list[Method] = [Handey()]
@@ -40,7 +42,7 @@ def run_bench(
             folders = scene_folders(scenes)
         else:
             place = scenes or Path(open_things.enter_context(tempfile.TemporaryDirectory(prefix="handey-scenes-")))
-            folders = simulate(SEEDS if seeds is None else seeds, place, library, progress)
+            folders = simulate(SEEDS if seeds is None else seeds, place, library, sensor, progress)
         report = bench_locate(load_labelled(folders, library), methods, tell, progress, len(folders))
     if plot_to is not None and report["rows"]:
         plot(report["summary"], plot_to)

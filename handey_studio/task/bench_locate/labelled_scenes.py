@@ -9,7 +9,7 @@ import numpy as np
 
 from handey_studio.base import BadInput, Progress, Value
 from handey_studio.cell.scene_files import load_scene, read_json, save_scene
-from handey_studio.cell.scenes import random_scene
+from handey_studio.cell.scenes import CAMERA, SceneOptions, random_scene
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.sensing.files import read_depth
 from handey_studio.task.bench_locate.judgement import Judge
@@ -43,17 +43,18 @@ def scene_folders(folder: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def simulate(seeds: Iterable[int], folder: Path, library: Library, progress: Progress) -> tuple[Path, ...]:
-    """The folders of the seeds' scenes below `folder`, made where they are missing: scenes are always measured from their files."""
+def simulate(seeds: Iterable[int], folder: Path, library: Library, sensor: str, progress: Progress) -> tuple[Path, ...]:
+    """The folders of the seeds' scenes below `folder`, made where they are missing: scenes are always measured from their files.
+    `sensor` as in `SceneOptions`."""
     seeds = list(seeds)
     folders = []
     for number, seed in enumerate(seeds):
         if progress.cancelled:
             break
-        place = folder / f"{seed:04d}"
+        place = folder / (f"{seed:04d}" if sensor == CAMERA else f"{seed:04d}-{sensor}")
         if not (place / "truth.json").is_file():
             progress.report(number / len(seeds), f"making scene {seed}")
-            save_scene(random_scene(seed, library), place)
+            save_scene(random_scene(seed, library, SceneOptions(sensor=sensor)), place)
         folders.append(place)
     return tuple(folders)
 
@@ -78,8 +79,11 @@ def _real(folder: Path) -> LabelledScene:
     labels = cv2.imread(str(folder / "labels.png"), cv2.IMREAD_UNCHANGED)
     if labels is None or labels.shape != reading.view.depth.shape:
         raise BadInput(f'"{folder / "labels.png"}" is not a label image of the size of its depth image.')
-    objects = content.get("objects", [])
-    names = [*dict.fromkeys([*(found["part"] for found in objects), *content.get("absent", [])])]
+    try:
+        objects = [(int(found["label"]), str(found["part"])) for found in content["objects"]]
+        names = [*dict.fromkeys([*(part for _, part in objects), *map(str, content.get("absent", []))])]
+    except (KeyError, TypeError, ValueError):
+        raise BadInput(f'"{folder / "objects.json"}" must hold objects, each with label and part, and optionally absent parts.') from None
     parts = {name: replace(read_part(folder.parent.parent / "parts" / f"{name}.obj"), name=name) for name in names}
-    labelled = tuple(Labelled(found["part"], np.asarray(labels == found["label"])) for found in objects)
+    labelled = tuple(Labelled(part, np.asarray(labels == label)) for label, part in objects)
     return LabelledScene(folder.name, reading.view, reading.knows_world, tuple(parts.values()), LabelJudge(reading.view, labelled, parts))
