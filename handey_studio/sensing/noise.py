@@ -8,10 +8,10 @@ more a larger window shows than a smaller one tells that, and by as much again t
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.sensing.depth_view import Orthographic, Pinhole
+from handey_studio.sensing.windows import fit_windows, window_corners
 
 SIDES_PX = (7, 11, 17)  # of the windows
 WINDOWS = 450  # of each size; more tell no more
@@ -100,54 +100,5 @@ def _growth(windows: NDArray) -> float:
 
 def _windows(depth: NDArray, side: int, pinhole: bool) -> NDArray:
     """Mean depth and residual [m] (n, 2) of up to `WINDOWS` windows in even steps over the image."""
-    height, width = depth.shape
-    if min(height, width) < side:
-        return np.empty((0, 2))
-    step = max(side, int(np.ceil(np.sqrt(height * width / WINDOWS))))
-    v, u = (np.arange((size - side) % step // 2, size - side + 1, step) for size in (height, width))
-    found = _residuals(depth, v, u, side, pinhole, MIN_FILLED)
-    return found[found[:, 1] >= 0.0]
-
-
-@njit(cache=True, error_model="numpy")
-def _residuals(depth: NDArray, tops: NDArray, lefts: NDArray, side: int, pinhole: bool, filled: float) -> NDArray:
-    """Mean depth and standard deviation [m] off the plane of each window (n, 2); −1 where too few readings are left.
-
-    A plane is linear in the image in 1/depth for a pinhole, in depth for a parallel view. Readings beyond three deviations are
-    left out and the plane is fitted again.
-    """
-    out = np.full((len(tops) * len(lefts), 2), -1.0)
-    half = 0.5 * (side - 1)
-    for n in range(len(out)):
-        top, left = tops[n // len(lefts)], lefts[n % len(lefts)]
-        gate, c0, cu, cv = np.inf, 0.0, 0.0, 0.0
-        for again in range(4):
-            m = error = total = su = sv = uu = uv = vv = q = qu = qv = 0.0
-            for y in range(side):
-                dv = y - half
-                for x in range(side):
-                    d = depth[top + y, left + x]
-                    if not np.isfinite(d) or (pinhole and d <= 0.0):
-                        continue
-                    du = x - half
-                    value = 1.0 / d if pinhole else d
-                    plane = c0 + cu * du + cv * dv
-                    e = (d - (1.0 / plane if pinhole else plane)) if again else 0.0
-                    if abs(e) > gate:
-                        continue
-                    m, error, total = m + 1.0, error + e * e, total + d
-                    su, sv, uu, uv, vv = su + du, sv + dv, uu + du * du, uv + du * dv, vv + dv * dv
-                    q, qu, qv = q + value, qu + value * du, qv + value * dv
-            if m < filled * side * side:
-                break
-            if again:
-                out[n, 0], out[n, 1] = total / m, np.sqrt(error / (m - 3.0))
-                gate = 3.0 * out[n, 1] + 1e-9
-            uu, uv, vv = uu - su * su / m, uv - su * sv / m, vv - sv * sv / m
-            qu, qv = qu - q * su / m, qv - q * sv / m
-            det = uu * vv - uv * uv
-            if det <= 1e-9:
-                break
-            cu, cv = (vv * qu - uv * qv) / det, (uu * qv - uv * qu) / det
-            c0 = (q - cu * su - cv * sv) / m
-    return out
+    found = fit_windows(depth, *window_corners(depth.shape, side, WINDOWS), side, pinhole, MIN_FILLED)
+    return found[found[:, 1] >= 0.0, :2]

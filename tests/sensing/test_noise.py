@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from handey_studio.sensing.depth_view import Orthographic, Pinhole
-from handey_studio.sensing.noise import LEAST_M, _residuals, measured_noise, noise_of
+from handey_studio.sensing.noise import LEAST_M, measured_noise, noise_of
+from handey_studio.sensing.windows import fit_windows
 from tests.sensing.scenes import cast, looking_at, pile
 
 KINECT = Pinhole(525.0, 525.0, 319.5, 239.5)
@@ -101,7 +102,7 @@ def test_the_fast_residuals_are_those_of_least_squares():
     plane, *_ = np.linalg.lstsq(A, 1.0 / d, rcond=None)
     plain = np.sqrt(((d - 1.0 / (A @ plane)) ** 2).sum() / (len(d) - 3))
     start = np.zeros(1, dtype=np.int64)
-    found = _residuals(np.ascontiguousarray(depth), start, start, 17, True, 0.5)[0]
+    found = fit_windows(np.ascontiguousarray(depth), start, start, 17, True, 0.5)[0]
     assert found[0] == pytest.approx(d.mean(), rel=1e-3)
     assert found[1] == pytest.approx(plain, rel=0.03)  # the fast one leaves out what lies beyond three deviations
 
