@@ -1,74 +1,76 @@
-"""Accept: what could stand by itself, then what explains the view jointly, refined once more from all that is seen."""
+"""Accept: what is probable by itself, then what explains the view jointly, refined once more from all that is seen."""
 
 import time
+from typing import NamedTuple
 
 from handey_studio.localization.candidates import Candidate, polished
 from handey_studio.localization.joint import explain_jointly
 from handey_studio.localization.result import Hypothesis, LocatedPose, pose_matrix
 from handey_studio.localization.samples import DENSER, part_samples
-from handey_studio.localization.score import score
-from handey_studio.localization.search import Search
+from handey_studio.localization.score import Score, score
+from handey_studio.localization.search import Search, below_table
 
-Fall = tuple[str, float, float, str]  # reason, value, limit, unit
 MOST_RIVALS = 60  # candidates that are weighed against one another
 
 
+class Fall(NamedTuple):
+    """Why a candidate fell, with the number and the limit."""
+
+    reason: str
+    value: float
+    limit: float
+    unit: str
+
+
 def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPose], list[Hypothesis]]:
-    """The poses that stand, best first, and every candidate with why it fell: the accepted first, then by rank."""
+    """The poses that stand, most probable first, and every candidate with why it fell: the accepted first, then by probability."""
     start = time.perf_counter()
-    falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _objection(search, candidate)) is not None}
-    ranked = sorted((n for n in range(len(candidates)) if n not in falls), key=lambda n: -candidates[n].support)
-    falls.update({n: ("too many better poses", k, MOST_RIVALS, "") for k, n in enumerate(ranked) if k >= MOST_RIVALS})
-    standing = ranked[:MOST_RIVALS]
-    joint = explain_jointly(search, [candidates[n] for n in standing])
-    for n, (_, rivalry) in joint.fell.items():
-        falls[standing[n]] = (rivalry.reason, rivalry.value, rivalry.limit, rivalry.unit)
-    accepted = []
-    count: dict[str, int] = {}
-    for n in (standing[k] for k in joint.chosen):
-        name = candidates[n].part.name
-        if count.get(name, 0) >= search.options.max_poses:
-            falls[n] = ("as many poses as asked for were found", count[name], search.options.max_poses, "")
-            continue
-        count[name] = count.get(name, 0) + 1
-        accepted.append(polished(search, candidates[n], part_samples(candidates[n].part, DENSER)))
-    for n, (reason, value, limit, unit) in sorted(falls.items()):
-        search.ledger.fall(candidates[n].entry, reason, value=value, limit=limit, unit=unit)
-    rejected = sorted(falls, key=lambda n: -candidates[n].support)
-    hypotheses = [_hypothesis(search, c, None) for c in accepted] + [_hypothesis(search, candidates[n], falls[n][0]) for n in rejected]
+    scores = [score(search, candidate) for candidate in candidates]
+    falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _objection(search, candidate, scores[n])) is not None}
+    chosen = _jointly(search, candidates, scores, falls)
+    accepted = [polished(search, candidates[n], part_samples(candidates[n].part, DENSER)) for n in chosen]
+    for n, fall in sorted(falls.items()):
+        search.ledger.fall(candidates[n].entry, fall.reason, value=fall.value, limit=fall.limit, unit=fall.unit)
+    rejected = sorted(falls, key=lambda n: -scores[n].probability)
+    poses = [_located(search, candidate) for candidate in accepted]
+    hypotheses = [_hypothesis(search, candidate, pose.score, None) for candidate, pose in zip(accepted, poses, strict=True)]
+    hypotheses += [_hypothesis(search, candidates[n], scores[n].probability, falls[n].reason) for n in rejected]
     search.timing["accept"] = time.perf_counter() - start
-    return sorted((_located(search, c) for c in accepted), key=lambda pose: -pose.score), hypotheses
+    return sorted(poses, key=lambda pose: -pose.score), hypotheses
 
 
-def _objection(search: Search, candidate: Candidate) -> Fall | None:
+def _jointly(search: Search, candidates: list[Candidate], scores: list[Score], falls: dict[int, Fall]) -> list[int]:
+    """Numbers of the candidates that stand together, most probable first; the others are added to `falls`."""
+    ranked = sorted((n for n in range(len(candidates)) if n not in falls), key=lambda n: -scores[n].probability)
+    falls.update({n: Fall("too many better poses", k, MOST_RIVALS, "") for k, n in enumerate(ranked) if k >= MOST_RIVALS})
+    standing = ranked[:MOST_RIVALS]
+    worth = [scores[n].probability * float(candidates[n].verdict.found[0]) for n in standing]
+    joint = explain_jointly(search, [candidates[n] for n in standing], worth)
+    falls.update({standing[k]: Fall(*rivalry) for k, rivalry in joint.fell.items()})
+    chosen = []
+    count: dict[str, int] = {}
+    for n in sorted((standing[k] for k in joint.chosen), key=lambda n: -scores[n].probability):
+        name = candidates[n].part.name
+        count[name] = count.get(name, 0) + 1
+        if count[name] > search.options.max_poses:
+            falls[n] = Fall("as many poses as asked for were found", count[name], search.options.max_poses, "")
+        else:
+            chosen.append(n)
+    return chosen
+
+
+def _objection(search: Search, candidate: Candidate, rated: Score) -> Fall | None:
     """The first thing that speaks against a candidate by itself."""
     options, verdict = search.options, candidate.verdict
-    depth = _below_table(search, candidate)
+    depth = below_table(search, candidate.part, candidate.R, candidate.t)
     allowed = 6.0 * search.view.noise + 0.5 * search.view.outline_error
     if depth > allowed:
-        return "it would stand below the table", depth, allowed, "m"
+        return Fall("it would stand below the table", depth, allowed, "m")
     if verdict.visible_fraction[0] < options.min_visible_fraction:
-        return "too little of it is seen", float(verdict.visible_fraction[0]), options.min_visible_fraction, ""
-    probability = score(search, candidate)
-    if probability < options.min_score:
-        return _worst(candidate), probability, options.min_score, ""
+        return Fall("too little of it is seen", float(verdict.visible_fraction[0]), options.min_visible_fraction, "")
+    if rated.probability < options.min_score:
+        return Fall(rated.doubt, rated.probability, options.min_score, "")
     return None
-
-
-def _worst(candidate: Candidate) -> str:
-    """What speaks most against a candidate whose score is too low."""
-    verdict = candidate.verdict
-    if 1.0 - verdict.surface_share[0] > 0.5 * (1.0 - verdict.edge_share[0]):
-        return "the sensor sees through it"
-    return "edges that should be seen are missing"
-
-
-def _below_table(search: Search, candidate: Candidate) -> float:
-    """How far [m] the pose reaches below the table, zero where no table is seen."""
-    if not search.table or search.options.table_z_m is None:
-        return 0.0
-    T_world_part = search.view.T_world_sensor @ pose_matrix(candidate.R, candidate.t)
-    return max(0.0, search.options.table_z_m - candidate.part.lowest(T_world_part))
 
 
 def _located(search: Search, candidate: Candidate) -> LocatedPose:
@@ -77,7 +79,7 @@ def _located(search: Search, candidate: Candidate) -> LocatedPose:
         candidate.part.name,
         search.view.T_world_sensor @ T,
         T,
-        score(search, candidate),
+        score(search, candidate).probability,
         int(verdict.predicted[0]),
         int(verdict.edges[0]),
         float(verdict.visible_fraction[0]),
@@ -87,8 +89,9 @@ def _located(search: Search, candidate: Candidate) -> LocatedPose:
     )
 
 
-def _hypothesis(search: Search, candidate: Candidate, reason: str | None) -> Hypothesis:
+def _hypothesis(search: Search, candidate: Candidate, probability: float, reason: str | None) -> Hypothesis:
     T_world_part = search.view.T_world_sensor @ pose_matrix(candidate.R, candidate.t)
     found, missing = float(candidate.verdict.found[0]), float(candidate.verdict.missing[0])
-    numbers = candidate.data, reason, candidate.model, candidate.entry
-    return Hypothesis(candidate.part.name, T_world_part, score(search, candidate), found, missing, *numbers)
+    return Hypothesis(
+        candidate.part.name, T_world_part, probability, found, missing, candidate.data, reason, candidate.model, candidate.entry
+    )

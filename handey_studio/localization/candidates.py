@@ -88,7 +88,7 @@ def polished(search: Search, candidate: Candidate, samples: PartSamples) -> Cand
 
 def _apart(search: Search, part: Part) -> float:
     """Poses nearer to one another than this [m] will refine to one."""
-    return max(SAME_SHARE * part.solid.diameter, search.view.outline_error)
+    return max(SAME_SHARE * part.solid.diameter, 0.5 * search.view.outline_error)
 
 
 def _hypotheses(search: Search, part: Part) -> Assignments:

@@ -47,8 +47,8 @@ class Evidence(NamedTuple):
 
 def limits_of(view: DepthView, slack: float = 1.0) -> Limits:
     """Tolerances from the view's noise and outline error; `slack` > 1 for poses that were not refined yet."""
-    agree = slack * (3.0 * view.noise + view.outline_error)
-    edge = slack * (1.5 * view.outline_error + view.noise)
+    agree = slack * (4.0 * view.noise + 0.5 * view.outline_error)
+    edge = slack * (view.outline_error + view.noise)
     outside = edge if slack > 1.0 else 0.4 * view.outline_error + view.noise
     return Limits(agree, 1.2 * agree, 1.5 * agree, edge, 2.0 * agree + view.outline_error, outside)
 

@@ -1,11 +1,12 @@
 """Explain the view jointly: of the poses that could stand, those that can stand together and explain most.
 
 Two poses are rivals when they claim the same readings, pass through one another, or are one pose of one part. Choosing the
-greatest total support among poses without rivals is a weighted independent set; its connected groups are small, and are
+greatest total worth among poses without rivals is a weighted independent set; its connected groups are small, and are
 solved exactly.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,7 @@ SAME_SHARE = 0.1  # of a part's diameter: poses nearer than this are one
 MAX_EXACT = 24  # poses in one group of rivals; larger groups keep their best
 
 
-@dataclass(frozen=True)
-class Rivalry:
+class Rivalry(NamedTuple):
     """Why two poses cannot both stand."""
 
     reason: str
@@ -32,28 +32,25 @@ class Rivalry:
     unit: str
 
 
-@dataclass(frozen=True)
-class Explanation:
-    """`chosen` numbers of candidates that stand together, best first; `fell` tells for every other one against whom it fell, and why."""
+class Explanation(NamedTuple):
+    """`chosen` numbers of candidates that stand together, of most worth first; `fell` tells why each other one cannot stand beside them."""
 
-    chosen: tuple[int, ...]
-    fell: dict[int, tuple[int, Rivalry]]
+    chosen: list[int]
+    fell: dict[int, Rivalry]
 
 
-def explain_jointly(search: Search, candidates: list[Candidate]) -> Explanation:
-    """The candidates, in order of support, that explain most of the view together."""
-    support = np.array([max(candidate.support, 1e-6) for candidate in candidates])
+def explain_jointly(search: Search, candidates: list[Candidate], worth: Sequence[float]) -> Explanation:
+    """The candidates that can stand together and are of the greatest total worth."""
     rivals = _rivals(search, candidates)
     chosen: list[int] = []
     for group in _groups(len(candidates), rivals):
-        chosen += _best_of(sorted(group, key=lambda n: -support[n])[:MAX_EXACT], support, rivals)
-    chosen.sort(key=lambda n: -support[n])
+        chosen += _best_of(sorted(group, key=lambda n: -worth[n])[:MAX_EXACT], np.asarray(worth), rivals)
+    chosen.sort(key=lambda n: -worth[n])
     fell = {}
     for n in set(range(len(candidates))) - set(chosen):
-        against = [k for k in chosen if (min(n, k), max(n, k)) in rivals]
-        if against:
-            fell[n] = (against[0], rivals[min(n, against[0]), max(n, against[0])])
-    return Explanation(tuple(chosen), fell)
+        against = [rivals[min(n, k), max(n, k)] for k in chosen if (min(n, k), max(n, k)) in rivals]
+        fell[n] = against[0] if against else Rivalry("better poses take its place", worth[n], worth[chosen[0]], "m")
+    return Explanation(chosen, fell)
 
 
 def _rivals(search: Search, candidates: list[Candidate]) -> dict[tuple[int, int], Rivalry]:
@@ -101,18 +98,18 @@ def _groups(n: int, rivals: dict[tuple[int, int], Rivalry]) -> list[list[int]]:
     return [[k for k in range(n) if group[k] == number] for number in sorted(set(group))]
 
 
-def _best_of(group: list[int], support: NDArray, rivals: dict[tuple[int, int], Rivalry]) -> list[int]:
-    """The subset without rivals of the greatest total support, by branch and bound over the group, best first."""
+def _best_of(group: list[int], worth: NDArray, rivals: dict[tuple[int, int], Rivalry]) -> list[int]:
+    """The subset without rivals of the greatest total worth, by branch and bound over the group, best first."""
     best: tuple[float, list[int]] = (0.0, [])
 
     def extend(rest: list[int], total: float, taken: list[int]) -> None:
         nonlocal best
         if total > best[0]:
             best = (total, taken)
-        if not rest or total + support[rest].sum() <= best[0]:
+        if not rest or total + worth[rest].sum() <= best[0]:
             return
         first, others = rest[0], rest[1:]
-        extend([n for n in others if (min(n, first), max(n, first)) not in rivals], total + support[first], [*taken, first])
+        extend([n for n in others if (min(n, first), max(n, first)) not in rivals], total + worth[first], [*taken, first])
         extend(others, total, taken)
 
     extend(group, 0.0, [])

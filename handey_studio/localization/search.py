@@ -5,16 +5,18 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handey_studio.base import Ledger
 from handey_studio.localization.edges import edge_pixels
 from handey_studio.localization.evidence import Evidence, Limits, evidence_of, limits_of
 from handey_studio.localization.hypotheses import MatchTolerances, tolerances
 from handey_studio.localization.refine import Weights, weights_of
-from handey_studio.localization.result import LocateOptions
+from handey_studio.localization.result import LocateOptions, pose_matrix
 from handey_studio.localization.segments import DataEdge, data_edges, link
 from handey_studio.localization.surface import surface_of
 from handey_studio.sensing.depth_view import DepthView
+from handey_studio.world.part import Part
 
 ROUGH = 1.8  # tolerances of poses straight from two edges, against those of refined ones
 MIN_EDGE_PX = 8.0
@@ -58,6 +60,13 @@ def look(view: DepthView, options: LocateOptions) -> Search:
     limits, rough, weights = limits_of(view), limits_of(view, ROUGH), weights_of(view, surface.pixel)
     table = _sees_table(view, options)
     return Search(view, evidence, edges, options, limits, rough, weights, tolerances(view), table, ledger, Counter(), timing)
+
+
+def below_table(search: Search, part: Part, R: NDArray, t: NDArray) -> float:
+    """How far [m] a part at a pose (sensor's frame) reaches below the table, zero where no table is seen."""
+    if not search.table or search.options.table_z_m is None:
+        return 0.0
+    return max(0.0, search.options.table_z_m - part.lowest(search.view.T_world_sensor @ pose_matrix(R, t)))
 
 
 def _sees_table(view: DepthView, options: LocateOptions) -> bool:

@@ -20,6 +20,7 @@ CLEAR_PX = 2.5  # from the part's own edges before an edge of the view is none o
 STEEP = 0.4  # cosine; a face seen more squarely than this should give readings
 UNREAD_COST = 0.3  # of a reading that sees through: no reading where there should be one
 ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but raggedly
+CREASE_DISCOUNT = 0.5  # of a missing edge, if it is a crease
 GLANCE = 90  # points of all faces that the first look takes
 MAX_THROUGH = 0.3
 MIN_VISIBLE_SHARE = 0.2  # of an edge's samples that must be visible for the edge to be predicted
@@ -27,7 +28,8 @@ MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the 
 
 
 class Verdict(NamedTuple):
-    """What speaks for and against poses (n,): `found` and `missing` [m] of visible edge; of the faces that look at the sensor [m²]
+    """What speaks for and against poses (n,): `found` and `missing` [m] of visible edge, `unbent` of it missing between two faces that are
+    both seen, where creases are harder to find than outlines; of the faces that look at the sensor [m²]
     those `on` readings, seen `through`, `hidden` behind nearer readings, and `unknown` where nothing was read; the number of
     edges `predicted` to be seen and of those found, `edges`; and how far found edge pixels `scatter` [m] about a common margin; and where
     the view has a straight edge and the part none, `stray` [m²] of its faces."""
@@ -42,6 +44,7 @@ class Verdict(NamedTuple):
     edges: NDArray
     scatter: NDArray
     stray: NDArray
+    unbent: NDArray
 
     def rows(self, chosen: NDArray) -> "Verdict":
         """Those of some of the poses, by their numbers."""
@@ -65,14 +68,16 @@ class Verdict(NamedTuple):
     @property
     def support(self) -> NDArray:
         """Rank [m]: found less missing edge, less what is seen through, as a length, times the shares that are right."""
-        balance = self.found - self.missing - 2.0 * np.sqrt(self.through)
+        balance = self.found - self.missing + CREASE_DISCOUNT * self.unbent - 2.0 * np.sqrt(self.through)
         return balance * np.where(balance > 0, self.edge_share * self.surface_share**2, 1.0)
 
 
 def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, every: int = 1) -> Verdict:
     """Verdicts on the poses R (n, 3, 3), t (n, 3) of the part in the sensor's frame, from every `every`-th sample."""
     counts = _verify(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits, every)
-    return Verdict(*(every * counts[:, :6]).T, *counts[:, 6:].T)
+    lengths_and_areas = (0, 1, 2, 3, 4, 5, 9, 10)
+    counts[:, lengths_and_areas] *= every
+    return Verdict(*counts.T)
 
 
 def unopposed(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits) -> NDArray:
@@ -145,6 +150,15 @@ def edge_state(R, t, k, samples, evidence, limits):
 
 
 @njit(cache=True)
+def crease_in_sight(R, t, k, samples, evidence):
+    """Whether both faces beside an edge sample look at the sensor."""
+    p = samples.edge_point[k]
+    x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
+    left, right = samples.left[k], samples.right[k]
+    return facing(R, left, x, y, z, evidence.camera) >= GRAZING and facing(R, right, x, y, z, evidence.camera) >= GRAZING
+
+
+@njit(cache=True)
 def inwards(R, t, k, edge, samples, evidence):
     """How far [m] an edge pixel lies from an edge sample across the edge in the image, positive towards the face that is seen."""
     p, a = samples.edge_point[k], samples.along[k]
@@ -176,6 +190,8 @@ def _edges(R, t, samples, evidence, limits, offset, every, out):
             out[0] += ENDS_WORTH * weight
         elif state >= 0:
             out[1 - state] += weight
+            if state == 0 and crease_in_sight(R, t, k, samples, evidence):
+                out[10] += weight
         visible, found, samples_of_edge = visible + (state >= 0), found + (state >= 1), samples_of_edge + 1
         if k + every >= len(samples.edge) or samples.edge[k + every] != samples.edge[k]:
             if visible >= 2 and visible >= MIN_VISIBLE_SHARE * samples_of_edge:
@@ -238,7 +254,7 @@ def _unopposed(R, t, samples, evidence, limits):
 
 @njit(cache=True)
 def _verify(R, t, samples, evidence, limits, every):
-    out = np.zeros((len(t), 10))
+    out = np.zeros((len(t), 11))
     for n in range(len(t)):
         _edges(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
         _surfaces(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
