@@ -99,8 +99,9 @@ def _bench_arguments(bench: argparse.ArgumentParser) -> None:
 
 
 def _locate_arguments(locate: argparse.ArgumentParser) -> None:
-    locate.add_argument("--depth", required=True, type=Path, help="16-bit PNG, or organised .npy cloud [m]")
+    locate.add_argument("--depth", required=True, type=Path, help="16-bit PNG, or a cloud: .npy, .ply, .pcd")
     locate.add_argument("--camera", type=Path, help="camera JSON with fx fy cx cy depth_scale (a cloud can do without)")
+    locate.add_argument("--cloud-unit", choices=("m", "cm", "mm"), default="m", help="unit of a cloud's coordinates (default: m)")
     locate.add_argument("--part", required=True, action="append", help="a part by name, or a mesh file; may be given again")
     locate.add_argument("--part-scale", type=float, default=1.0, help="scales mesh files on reading: 0.001 for millimetres")
     locate.add_argument("--max-poses", type=_positive, default=5, help="at most this many of each part (default: 5)")
@@ -175,23 +176,27 @@ def _locate(given: argparse.Namespace) -> int:
     from handey_studio.localization import LocateOptions, localize
     from handey_studio.localization.report import locate_report
     from handey_studio.sensing.files import read_depth
-    from handey_studio.sensing.support import support_plane
+    from handey_studio.sensing.report import seen_report
+    from handey_studio.sensing.support import support_planes
 
     _check_output(given.json)
     library = Library.choose(given.library)
     parts = [library.part(name, given.part_scale) for name in given.part]
     begun = time.perf_counter()
-    reading = read_depth(given.depth, given.camera)
+    reading, supports = read_depth(given.depth, given.camera, given.cloud_unit), None
     timing, view, options = {"read": time.perf_counter() - begun}, reading.view, LocateOptions(max_poses=given.max_poses)
     rng = np.random.default_rng(given.seed)
     if not reading.knows_world:
         begun = time.perf_counter()
-        support = support_plane(view, rng)
-        view = replace(view, T_world_sensor=support.T_world_sensor)
-        options = options if support.found else replace(options, table_z_m=None)
+        supports = support_planes(view, rng)
+        view = replace(view, T_world_sensor=supports.table.T_world_sensor)
+        options = options if supports.table.found else replace(options, table_z_m=None)
         timing["support"] = time.perf_counter() - begun
     result = localize(view, parts, options, rng)
-    _write_json(given.json, locate_report(result, view.T_world_sensor, timing))
+    report = locate_report(result, view.T_world_sensor, timing) | seen_report(reading, supports)
+    for pose in report["poses"]:
+        pose["T_file_part"] = (reading.T_file_sensor @ pose["T_sensor_part"]).tolist()
+    _write_json(given.json, report)
     if not result.poses:
         print(result.reason, file=sys.stderr)
         return NOTHING_FOUND
