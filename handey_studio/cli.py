@@ -122,6 +122,9 @@ def _scan_arguments(scan: argparse.ArgumentParser) -> None:
     scan.add_argument("--json", type=Path, help="where the counts, the noise and the timing go")
     scan.add_argument("--channel", default="auto", help="the laser's colour: auto, red, green, blue or grey (default: auto)")
     scan.add_argument("--stripe", default="auto", help="how the stripe runs through the photographs: auto, down or across (default: auto)")
+    scan.add_argument(
+        "--step-mm", type=_three, metavar="X,Y,Z", help="the rig's step between photographs, in the range frame (default: the file's)"
+    )
     scan.add_argument("--cell-mm", type=float, help="side of the depth map's cells (default: the file's, or the stripes' spacing)")
 
 
@@ -210,7 +213,7 @@ def _locate(given: argparse.Namespace) -> int:
 
 def _scan(given: argparse.Namespace) -> int:
     from handey_studio.cell.recorded import write_depth_map
-    from handey_studio.geometry.transforms import apply
+    from handey_studio.geometry.transforms import apply, transform
     from handey_studio.sensing.instrument_file import read_instrument
     from handey_studio.sensing.scan import ScanOptions, depth_map_of, scan_folder
     from handey_studio.sensing.scan_files import scan_view, write_cloud, write_view
@@ -223,6 +226,8 @@ def _scan(given: argparse.Namespace) -> int:
     instrument = read_instrument(given.calibration)
     if given.cell_mm is not None:
         instrument = replace(instrument, cell=1e-3 * given.cell_mm)
+    if given.step_mm is not None:
+        instrument = replace(instrument, rig=None, rig_step=transform(None, 1e-3 * np.array(given.step_mm)))
     begun = time.perf_counter()
     scan = scan_folder(given.folder, instrument, given.dark, ScanOptions(given.channel, given.stripe), _Lines())
     timing = {"scan": time.perf_counter() - begun}
@@ -237,12 +242,15 @@ def _scan(given: argparse.Namespace) -> int:
             f'no stripe was read in the photographs of "{given.folder}"; try --channel or --stripe, or give a dark frame.', file=sys.stderr
         )
         return NOTHING_FOUND
-    if given.cloud:
-        write_cloud(given.cloud, apply(instrument.T_world_range, scan.points_range))
-    if given.depth and given.depth.suffix.lower() == ".npz":
-        write_depth_map(given.depth, depth_map)
-    elif given.depth:
-        write_view(given.depth, scan_view(scan, instrument))
+    try:
+        if given.cloud:
+            write_cloud(given.cloud, apply(instrument.T_world_range, scan.points_range))
+        if given.depth and given.depth.suffix.lower() == ".npz":
+            write_depth_map(given.depth, depth_map)
+        elif given.depth:
+            write_view(given.depth, scan_view(scan, instrument))
+    except OSError as error:
+        raise BadInput(f'"{error.filename}" cannot be written: {error.strerror}.') from None
     return DONE
 
 
@@ -418,6 +426,14 @@ def _board_size(text: str) -> tuple[int, int]:
     if not (columns.isdigit() and rows.isdigit()):
         raise argparse.ArgumentTypeError(f'"{text}" is not COLSxROWS, the numbers of inner corners, such as 9x6')
     return int(columns), int(rows)
+
+
+def _three(text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(word) for word in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'"{text}" is not X,Y,Z, three numbers') from None
+    return x, y, z
 
 
 def _port(text: str) -> int:

@@ -146,7 +146,8 @@ def write_sweep_folder(
     The range finder's planes are as many as `options.stripes`. Raises BadInput when the folder cannot be written or is there already.
     """
     finder = replace(finder, planes=options.stripes)
-    instrument = instrument_of(finder)
+    spacing = 2.0 * float(finder.laser[2]) * finder.sweep_rad / (finder.planes - 1)
+    instrument = replace(instrument_of(finder), cell=max(finder.cell, round(spacing, 4)))
     _new_folders(folder, STRIPES)
     _write_true(folder, instrument)
     placed = _in_range(bodies, finder)

@@ -18,6 +18,8 @@ FEW_PHOTOGRAPHS = 5  # with fewer the lens's smaller coefficients are left out: 
 WORST_PX = 1.0  # a board whose corners lie farther off than this, and than OUTLIER times the others, was misread or moved
 OUTLIER = 3.0
 FOCAL_DEVIATION = 0.02  # greatest relative standard deviation of the focal length that counts as known
+LEAST_TILT_RAD = np.deg2rad(10.0)  # between boards: boards that face one way look alike through any lens farther off
+FOCAL_SHARES = (0.2, 15.0)  # of the photograph's longer side: no lens of a stripe camera is beyond
 REFINE = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
 
 
@@ -106,10 +108,12 @@ def fit_camera(board: Board, corners: Sequence[NDArray], size: tuple[int, int]) 
         used = good
         solved = _solve(board, [seen for seen, keep in zip(corners, good, strict=True) if keep], size)
     camera, Ts, deviation, rms = solved
-    if not deviation <= FOCAL_DEVIATION * camera.focal_px:
+    tilt = float(np.arccos(np.clip(Ts[:, :3, 2] @ Ts[:, :3, 2].T, -1.0, 1.0)).max())
+    low, high = (share * max(size) for share in FOCAL_SHARES)
+    if not deviation <= FOCAL_DEVIATION * camera.focal_px or tilt < LEAST_TILT_RAD or not low < camera.focal_px < high:
         raise BadInput(
-            f"the board's photographs do not determine the focal length ({camera.focal_px:.0f} px, uncertain by {deviation:.0f}); "
-            "tilt the board towards the camera and away from it, by some 30°."
+            f"the board's photographs do not determine the focal length ({camera.focal_px:.0f} px came out, boards that differ by "
+            f"{np.rad2deg(tilt):.0f}° in tilt); tilt the board towards the camera and away from it, by some 30°."
         )
     return CameraFit(camera, Ts, rms, used)
 

@@ -18,7 +18,7 @@ from handey_studio.geometry.transforms import apply, inverse, rotation_angle, tr
 from handey_studio.sensing.board import Board, CameraFit, find_corners, fit_camera, place_boards
 from handey_studio.sensing.board_stripes import LitBoard, board_stripes
 from handey_studio.sensing.instrument import Instrument
-from handey_studio.sensing.laser_planes import distances, fit_plane
+from handey_studio.sensing.laser_planes import PlaneFit, distances, fit_plane
 from handey_studio.sensing.photographs import SUFFIXES, Photograph, list_photographs, read_photograph
 from handey_studio.sensing.stripe_camera import StripeCamera
 from handey_studio.sensing.stripe_light import LaserColour
@@ -152,17 +152,9 @@ def _calibration(
     left_out: dict[str, str],
     colour: LaserColour,
 ) -> Calibration:
-    if len(stripes) < 2:
-        raise BadInput(f"a straight stripe was found on the board in {len(stripes)} photographs; at least 2 poses of the board are needed.")
-    points = np.concatenate([_thinned(points) for points in stripes.values()])
-    plane = fit_plane(points)
-    if not plane.extents[1] >= max(SPREAD[0] * plane.rms, SPREAD[1] * plane.extents[0]):
-        raise BadInput(
-            f"the stripes on the {len(stripes)} boards lie along one line (they spread {1e3 * plane.extents[1]:.2f} mm across it), "
-            "so the laser's plane may turn about it; move the board towards the camera, or tilt it the other way."
-        )
+    plane = laser_plane(list(stripes.values()))
     table = _table(names, options)
-    T_range_camera = _range_frame(fit.Ts_camera_board[names.index(table)], board)
+    T_range_camera = range_frame(fit.Ts_camera_board[names.index(table)], board)
     normal = T_range_camera[:3, :3] @ plane.plane[:3]
     in_range = np.array([*normal, plane.plane[3] + normal @ T_range_camera[:3, 3]])
     camera = replace(fit.camera, T_range_camera=T_range_camera)
@@ -181,6 +173,19 @@ def _calibration(
     )
 
 
+def laser_plane(stripes: Sequence[NDArray]) -> PlaneFit:
+    """The laser's plane through its stripes on boards, each (n, 3) [m]. Raises BadInput when they do not determine it."""
+    if len(stripes) < 2:
+        raise BadInput(f"a straight stripe was found on the board in {len(stripes)} photographs; at least 2 poses of the board are needed.")
+    plane = fit_plane(np.concatenate([_thinned(points) for points in stripes]))
+    if not plane.extents[1] >= max(SPREAD[0] * plane.rms, SPREAD[1] * plane.extents[0]):
+        raise BadInput(
+            f"the stripes on the {len(stripes)} boards lie along one line (they spread {1e3 * plane.extents[1]:.2f} mm across it), "
+            "so the laser's plane may turn about it; move the board towards the camera, or tilt it the other way."
+        )
+    return plane
+
+
 def _thinned(points: NDArray) -> NDArray:
     return points[np.linspace(0, len(points) - 1, EACH).round().astype(int)]
 
@@ -193,7 +198,7 @@ def _table(names: list[str], options: CalibrateOptions) -> str:
     return options.table
 
 
-def _range_frame(T_camera_board: NDArray, board: Board) -> NDArray:
+def range_frame(T_camera_board: NDArray, board: Board) -> NDArray:
     """T_range_camera for the range frame on a board: origin in its middle, z out of it, x as near to the photograph's rows as can be.
 
     The board's own corners could be counted from either end, so its axes are not used.
@@ -218,11 +223,11 @@ def _rig_step(
         if corners is None:
             raise BadInput(f'the board was not found in "{moved}".')
         after = place_boards(board, [corners], fit.camera).Ts_camera_board[0]
-        return _one_step(poses[path.stem], after, board, T_range_camera, options)
+        return one_step(poses[path.stem], after, board, T_range_camera, options)
     return None
 
 
-def _one_step(before: NDArray, after: NDArray, board: Board, T_range_camera: NDArray, options: CalibrateOptions) -> NDArray:
+def one_step(before: NDArray, after: NDArray, board: Board, T_range_camera: NDArray, options: CalibrateOptions) -> NDArray:
     """The rig's step from a resting board's poses before the camera, before and after some steps."""
     T_before_after = before @ inverse(after)
     if rotation_angle(T_before_after[:3, :3]) < PURE_SHIFT_RAD:

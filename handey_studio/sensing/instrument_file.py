@@ -90,7 +90,7 @@ def _instrument(given: dict[str, Any]) -> Instrument:
     if not isinstance(cameras, list) or not 1 <= len(cameras) <= MAX_CAMERAS or not all(isinstance(one, dict) for one in cameras):
         raise BadInput(f'"cameras" must be a list of 1 to {MAX_CAMERAS} objects.')
     laser, rig = _object(given, "laser"), _object(given, "rig") if "rig" in given else {}
-    if rig and not rig.keys() & {"step", "poses"}:
+    if "rig" in given and not rig.keys() & {"step", "poses"}:
         raise BadInput('"rig" needs "step" or "poses".')
     return Instrument(
         cameras=tuple(_camera(one) for one in cameras),

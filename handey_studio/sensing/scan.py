@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -145,12 +146,13 @@ def _looks(
     view = instrument.cameras[camera]
     planes, rig = instrument.planes_of(len(group)), instrument.rig_of(len(group))
     looks: list[Look] = []
+    read_dark = lru_cache(maxsize=1)(read_photograph)  # one dark frame often serves all
     for k, (path, dark) in enumerate(zip(group, darks, strict=True)):
         if progress.cancelled:
             break
         progress.report(k / len(group), f"photograph {k + 1} of {len(group)}: {path.name}")
         photograph = _of_size(read_photograph(path), view, path)
-        light = laser_light(photograph, None if dark is None else read_photograph(dark), colour)
+        light = laser_light(photograph, None if dark is None else read_dark(dark), colour)
         peaks = find_peaks(light, photograph.saturated, options.direction, options.peaks)
         looks.append(look_at(peaks, view, planes[k], rig[k], instrument.laser, options.direction))
         if sum(len(look.points) for look in looks) > MAX_POINTS:

@@ -59,12 +59,13 @@ class StripeCamera(Value):
         view = self.projection
         flat = cv2.undistortPoints(np.ascontiguousarray(uv[:, None]), self.matrix, np.array(self.distortion)).reshape(-1, 2)
         rays = np.concatenate([flat, np.ones((len(flat), 1))], axis=1)
-        for _ in range(LENS_ROUNDS):  # OpenCV stops after five rounds of its own, some hundredths of a pixel off with strong lenses
-            missed = uv - self.project(rays)
-            rays[:, :2] += missed / (view.fx, view.fy)
-            if not np.nanmax(np.abs(missed)) > LENS_ENOUGH_PX:
-                break
-        missed = np.abs(self.project(rays) - uv).max(axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # where the lens has no inverse the rounds run away
+            for _ in range(LENS_ROUNDS):  # OpenCV stops after five rounds of its own, some hundredths of a pixel off with strong lenses
+                missed = uv - self.project(rays)
+                rays[:, :2] += missed / (view.fx, view.fy)
+                if not np.max(np.abs(missed)) > LENS_ENOUGH_PX:
+                    break
+            missed = np.abs(self.project(rays) - uv).max(axis=1)
         rays[~(missed <= LENS_TOLERANCE_PX)] = np.nan
         return rays
 

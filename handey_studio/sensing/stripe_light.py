@@ -16,7 +16,7 @@ SINGLE = {"blue": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "red": (0.0, 0.0, 1
 GREY = (1 / 3, 1 / 3, 1 / 3)
 STRIPE_SHARE = 0.0005  # of a photograph's pixels: fewer than a stripe one pixel wide has, so the brightest are all the laser's
 COLOURED = 12.0  # least excess of a colour over grey, of 255, that tells a coloured laser
-BROAD_PX = 31  # what stays over so many pixels is a coloured thing, not a stripe
+BROAD_PX = 25  # what holds a square of so many pixels is a coloured thing, not a stripe
 READABLE = (20.0, 235.0)  # light, of 255, by which the exposures of photograph and dark frame are compared
 
 
@@ -67,8 +67,9 @@ def _colour_of_excess(pairs: Sequence[tuple[Photograph, Photograph | None]]) -> 
     for name, weights in EXCESS.items():
         narrow = []
         for photograph, _ in pairs:
-            excess = cv2.GaussianBlur(photograph.light @ np.array(weights, dtype=np.float32), (0, 0), 1.0)
-            narrow.append(float(np.quantile(excess - cv2.blur(excess, (BROAD_PX, BROAD_PX)), 1.0 - STRIPE_SHARE)))
+            excess = np.maximum(cv2.GaussianBlur(photograph.light @ np.array(weights, dtype=np.float32), (0, 0), 1.0), 0.0)
+            thin = excess - cv2.morphologyEx(excess, cv2.MORPH_OPEN, np.ones((BROAD_PX, BROAD_PX), np.uint8))
+            narrow.append(float(np.quantile(thin, 1.0 - STRIPE_SHARE)))
         if np.median(narrow) > strength:
             best, strength = LaserColour(weights, name), float(np.median(narrow))
     return best

@@ -20,6 +20,7 @@ REASONS = ("kept", "no stripe", "faint", "two peaks", "too wide", "at the border
 KEPT, NO_STRIPE, FAINT, TIED, WIDE, BORDER, ALONE = range(len(REASONS))
 LEAST_LIGHT = 4.0  # of 255, after smoothing; noise may ask for more
 NOISE_FACTOR = 6.0
+MOUNTAINS = 6  # so many are looked at in a row before it is given up
 FLOOR = 0.1  # of the peak's height: light below it is the stripe's halo
 AROUND = 3  # rows on either side in which a peak looks for the rest of its stripe
 
@@ -70,9 +71,13 @@ def find_peaks(light: NDArray, saturated: NDArray, direction: str, options: Peak
 
 
 def stripe_direction(lights: Sequence[tuple[NDArray, NDArray]], options: PeakOptions = PeakOptions()) -> str:
-    """Whether the stripes of photographs (light, saturated) run down or across: the way in which more peaks are found."""
-    found = {d: sum(len(find_peaks(light, saturated, d, options).uv) for light, saturated in lights) for d in DIRECTIONS[1:]}
-    return max(found, key=lambda direction: found[direction])
+    """Whether the stripes of photographs (light, saturated) run down or across: the way in which they are bright and narrow."""
+    sharpness = dict.fromkeys(DIRECTIONS[1:], 0.0)
+    for direction in sharpness:
+        for light, saturated in lights:
+            peaks = find_peaks(light, saturated, direction, options)
+            sharpness[direction] += float((peaks.light / peaks.width).sum())
+    return max(sharpness, key=sharpness.__getitem__)
 
 
 def _signal(rows: NDArray, saturated: NDArray, options: PeakOptions) -> tuple[NDArray, float]:
@@ -89,28 +94,40 @@ def _signal(rows: NDArray, saturated: NDArray, options: PeakOptions) -> tuple[ND
 
 @njit(cache=True)
 def _row_peaks(signal: NDArray, limit: float, max_width: int, tie: float) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Per row: the strongest peak's place [px], height, width at half height, and what became of it."""
+    """Per row: the strongest peak's place [px], height, width at half height, and what became of it. What is too wide is passed over."""
     rows = len(signal)
     place, height, width = np.full(rows, np.nan), np.zeros(rows), np.zeros(rows)
     state = np.full(rows, NO_STRIPE)
     for r in range(rows):
-        row = signal[r]
-        top = int(np.argmax(row))
-        if row[top] < limit:
-            continue
-        height[r] = row[top]
-        left, right = _crossing(row, top, -1), _crossing(row, top, 1)
-        width[r] = right - left
-        if left <= 0.0 or right >= len(row) - 1.0:
-            state[r] = BORDER
-        elif width[r] > max_width:
-            state[r] = WIDE
-        elif _other(row, top) >= tie * row[top]:
-            state[r] = TIED
-        else:
-            place[r] = _gravity(row, 0.5 * (left + right), 0.75 * width[r] + 1.0, FLOOR * row[top])
-            state[r] = KEPT
+        row = signal[r].copy()
+        for _ in range(MOUNTAINS):
+            top = int(np.argmax(row))
+            if row[top] < max(limit, tie * height[r]):
+                break
+            left, right = _crossing(row, top, -1), _crossing(row, top, 1)
+            outside = left <= 0.0 or right >= len(row) - 1.0
+            if right - left > max_width or outside:
+                if state[r] == NO_STRIPE:
+                    state[r] = BORDER if outside else WIDE
+            elif state[r] == KEPT:
+                state[r] = TIED
+                break
+            else:
+                height[r], width[r], state[r] = row[top], right - left, KEPT
+                place[r] = _gravity(row, 0.5 * (left + right), 0.75 * width[r] + 1.0, FLOOR * row[top])
+            _level(row, left, right)
     return place, height, width, state
+
+
+@njit(cache=True)
+def _level(row: NDArray, left: float, right: float) -> None:
+    """Take the mountain between two half heights out of the row, with its slopes down to the valleys."""
+    a, b = max(0, int(np.floor(left))), min(len(row) - 1, int(np.ceil(right)))
+    while a > 0 and row[a - 1] <= row[a]:
+        a -= 1
+    while b < len(row) - 1 and row[b + 1] <= row[b]:
+        b += 1
+    row[a : b + 1] = 0.0
 
 
 @njit(cache=True)
@@ -122,21 +139,6 @@ def _crossing(row: NDArray, top: int, step: int) -> float:
             return i + step * (row[i] - half) / (row[i] - row[i + step])
         i += step
     return float(i)
-
-
-@njit(cache=True)
-def _other(row: NDArray, top: int) -> float:
-    """The greatest light outside the mountain of `top`: beyond the valleys on either side of it."""
-    greatest = 0.0
-    for step in (-1, 1):
-        i, valley = top, row[top]
-        while 0 <= i + step < len(row):
-            i += step
-            if row[i] < valley:
-                valley = row[i]
-            elif row[i] - valley > greatest:
-                greatest = row[i] - valley
-    return greatest
 
 
 @njit(cache=True)
