@@ -23,7 +23,7 @@ from handey_studio.task.bench_locate import bench_locate, command, peers, plot, 
 from handey_studio.task.bench_locate.answers import Answer, Pose
 from handey_studio.task.bench_locate.label_judge import LabelJudge, Labelled
 from handey_studio.task.bench_locate.labelled_scenes import LabelledScene, load_labelled, scene_folders
-from handey_studio.task.bench_locate.peer_worker import first_of_voxels, share_on
+from handey_studio.task.bench_locate.peer_worker import around, first_of_voxels, share_on
 from handey_studio.task.bench_locate.summary import summarise, table
 from handey_studio.task.bench_locate.truth_judge import TruthJudge
 from handey_studio.world import Library, Part, write_obj
@@ -304,8 +304,9 @@ def test_the_workers_voxels():
     points = np.random.default_rng(1).uniform(-1, 1, (500, 3))
     kept = first_of_voxels(points, 0.5)
     assert len(kept) == len({tuple(cell) for cell in np.floor(points / 0.5)})
-    assert share_on(points, points, 0.1) == 1.0 and share_on(points + 5.0, points, 0.1) == 0.0
-    assert share_on(np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]]), np.zeros((1, 3)), 0.1) == 0.5
+    near = [bool((np.abs(np.floor(points / 0.1) - np.floor(point / 0.1)).max(axis=1) <= 1).any()) for point in points + 0.12]
+    assert share_on(points + 0.12, around(points, 0.1), 0.1) == np.mean(near) and 0.05 < np.mean(near) < 0.95
+    assert share_on(points, around(points, 0.1), 0.1) == 1.0 and share_on(points + 5e6, around(points, 0.1), 0.1) == 0.0
 
 
 # The shell and the plot.

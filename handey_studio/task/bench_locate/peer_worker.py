@@ -109,7 +109,8 @@ class PointPairs:
             return np.eye(4), 0.0
         _, refined = self.cv2.ppf_match_3d.ICP(100, 0.005, 2.5, 8).registerModelToScene(cloud, scene, list(found[:PPF_POSES]))
         poses = [np.array(pose.pose) for pose in refined]
-        shares = [share_on(cloud[:, :3] @ T[:3, :3].T + T[:3, 3], thinned, self.voxel) for T in poses]
+        held = around(thinned, self.voxel)
+        shares = [share_on(cloud[:, :3] @ T[:3, :3].T + T[:3, 3], held, self.voxel) for T in poses]
         best = int(np.argmax(shares))
         T = poses[best].copy()
         T[:3, 3] = 1e-3 * (T[:3, 3] + middle)
@@ -121,12 +122,22 @@ def first_of_voxels(points: NDArray, voxel: float) -> NDArray:
     return np.unique(np.floor(points / voxel).astype(np.int64), axis=0, return_index=True)[1]
 
 
-def share_on(points: NDArray, scene: NDArray, voxel: float) -> float:
-    """Share of points (n, 3) whose voxel, or a neighbouring one, holds a point of the scene (m, 3)."""
-    cells = {tuple(cell) for cell in np.floor(scene / voxel).astype(int).tolist()}
-    around = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)]
-    near = (any((x + i, y + j, z + k) in cells for i, j, k in around) for x, y, z in np.floor(points / voxel).astype(int).tolist())
-    return float(np.mean(list(near)))
+def share_on(points: NDArray, held: NDArray, voxel: float) -> float:
+    """Share of points (n, 3) whose voxel is one of `held`, from `around`."""
+    return float(np.isin(_keys(np.floor(points / voxel).astype(np.int64)), held).mean())
+
+
+def around(scene: NDArray, voxel: float) -> NDArray:
+    """The voxels, as numbers, that hold a point of the scene (m, 3) or lie next to one that does."""
+    cells = np.unique(np.floor(scene / voxel).astype(np.int64), axis=0)
+    steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3)
+    return np.unique(_keys((cells[:, None] + steps).reshape(-1, 3)))
+
+
+def _keys(cells: NDArray) -> NDArray:
+    """One number a voxel (n, 3); voxels further than 2²⁰ from the origin share theirs with none that is near."""
+    x, y, z = (np.clip(cells[:, k], -(2**20), 2**20 - 1) + 2**20 for k in range(3))
+    return (x << 42) | (y << 21) | z
 
 
 def peers(voxels_m: list[float]) -> dict[str, Peer]:
