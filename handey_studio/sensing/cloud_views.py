@@ -53,7 +53,7 @@ def view_of_cloud(path: Path, cloud: Cloud, unit_m: float, pinhole: Pinhole | No
 def _finite(points: NDArray) -> NDArray:
     """Points (n, 3) without the missing ones."""
     flat = points.reshape(-1, 3)
-    return flat[np.isfinite(flat[:, 2])].astype(float)
+    return flat[np.isfinite(flat[:, 2])]
 
 
 def _along(points: NDArray, T_sensor_cloud: NDArray) -> NDArray:

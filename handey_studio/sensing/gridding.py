@@ -10,6 +10,7 @@ from handey_studio.geometry.transforms import apply, inverse, transform
 from handey_studio.sensing.depth_view import Orthographic, Pinhole
 from handey_studio.sensing.raster import MAX_SIDE, Raster, raster_of
 
+MAX_POINTS = 3_000_000  # more are thinned to as many, taken at random: a view has half as many pixels at the most
 MAX_TAN = 1.5  # half the widest field of view, as a tangent
 MAX_BEHIND = 0.03  # of the cells that hold two surfaces; more, and the points were not seen from there
 MAX_EMPTIER = 0.01  # a viewpoint's image has no more holes than the view from above by this share: what a sensor sees hides nothing else
@@ -36,23 +37,27 @@ class Gridded(NamedTuple):
 def grid_points(points: NDArray, viewpoints: list[NDArray], rng: np.random.Generator) -> Gridded | None:
     """The view of finite points (n, 3) [m] in any frame; `viewpoints` (4, 4) are where a sensor may have stood, likeliest first.
 
-    A viewpoint serves if the points fill its image, one surface to each pixel. Else the view is parallel, from above the plane
-    with the most points on it, upper being the side where the others are. None if there is neither.
+    A viewpoint serves if the points lie on the raster of its image, or fill it without holes, one surface to each pixel. Else the view
+    is parallel, from above the plane with the most points on it, upper being the side where the others are. None if there is neither.
     """
-    above, holes = _from_above(points, rng), 1.0
-    if above is not None:
-        holes = _holes(above.depth)
+    if len(points) > MAX_POINTS:
+        points = points[rng.integers(len(points), size=MAX_POINTS)]
+    points = points.astype(float)
+    seen: list[Gridded] = []
     for T_cloud_sensor in viewpoints:
         for T in (T_cloud_sensor, _turned_to(points, T_cloud_sensor[:3, 3])):
-            found = _seen_from(points, T)
-            if found is not None and _holes(found.depth) <= holes + MAX_EMPTIER:
+            found, on_raster = _seen_from(points, T)
+            if found is not None and on_raster:
                 return found
-    return above
+            seen += [] if found is None else [found]
+    above = _from_above(points, rng)
+    holes = 1.0 if above is None else _holes(above.depth)
+    return next((found for found in seen if _holes(found.depth) <= holes + MAX_EMPTIER), above)
 
 
 def into_camera(points: NDArray, pinhole: Pinhole, shape: tuple[int, int] | None) -> NDArray:
     """Depth (H, W) [m] of points (n, 3) [m] of the sensor's frame in a known camera; without `shape` as far as the points go."""
-    points = points[points[:, 2] > 0]
+    points = points[points[:, 2] > 0].astype(float)
     uv = np.rint(pinhole.project(points))
     if shape is None:
         largest = uv[(np.abs(uv) < MAX_SIDE).all(axis=1)].max(axis=0, initial=0.0).astype(int)
@@ -104,24 +109,24 @@ def _holes(depth: NDArray) -> float:
     return 1.0 - float(known.sum()) / max(1, int((span | known).sum()))
 
 
-def _seen_from(points: NDArray, T_cloud_sensor: NDArray) -> Gridded | None:
-    """The pinhole's image from a viewpoint, None if the points do not look like seen from there."""
+def _seen_from(points: NDArray, T_cloud_sensor: NDArray) -> tuple[Gridded | None, bool]:
+    """The pinhole's image from a viewpoint, None if the points do not look like seen from there; whether they lie on its raster."""
     local = apply(inverse(T_cloud_sensor), points)
     local = local[local[:, 2] > 0]
     if len(local) < 0.99 * len(points):
-        return None
+        return None, False
     directions = local[:, :2] / local[:, 2:]
     if np.abs(np.quantile(directions, [0.01, 0.99], axis=0)).max() > MAX_TAN:
-        return None
+        return None, False
     raster = raster_of(directions)
     step = STEP_CELLS * raster.pitch[0] * float(np.median(local[:, 2]))
     depth, behind = nearest_surface(raster.pixels(directions), local[:, 2], raster.shape, step)
     if behind > MAX_BEHIND:
-        return None
+        return None, False
     pinhole = Pinhole(
         1.0 / raster.pitch[0], 1.0 / raster.pitch[1], -raster.origin[0] / raster.pitch[0], -raster.origin[1] / raster.pitch[1]
     )
-    return Gridded(without_pinholes(depth, step), pinhole, T_cloud_sensor)
+    return Gridded(without_pinholes(depth, step), pinhole, T_cloud_sensor), raster.regular
 
 
 def _turned_to(points: NDArray, eye: NDArray) -> NDArray:
