@@ -273,6 +273,7 @@ class Tell:
 
 
 def _with_command(state: State, label: str, command: MoveCommand) -> State:
+    """The MOVE set up anew; whoever sets it up looks at its ghost, no longer at a hypothesis."""
     check_command(state.session, command)
-    commands = (*state.session.commands[:-1], command)
-    return state.changed(label, replace(state.session, commands=commands))
+    session = with_view(state, hypothesis=-1).session
+    return state.changed(label, replace(session, commands=(*session.commands[:-1], command)))

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
-from handey_studio.geometry.transforms import apply, inverse
+from handey_studio.geometry.transforms import apply, inverse, rotate
 from handey_studio.localization.edge_pair import EdgePair, edge_pair
 from handey_studio.localization.evidence import Evidence, Limits
 from handey_studio.localization.pairs import model_edges
@@ -19,7 +19,7 @@ from handey_studio.localization.result import LocateOptions
 from handey_studio.localization.samples import PartSamples, part_samples
 from handey_studio.localization.search import Search, look
 from handey_studio.localization.segments import DataEdge
-from handey_studio.localization.verify import MIN_EDGE_SHARE, MIN_VISIBLE_SHARE, edge_state, verify
+from handey_studio.localization.verify import GRAZING, MIN_EDGE_SHARE, MIN_VISIBLE_SHARE, edge_state, verify
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world.part import Part
 
@@ -35,7 +35,7 @@ class Explanation(Value):
     Predicted edges: `pieces_world` (n, 2, 3) [m] with the `state` (n,) of each, FOUND, MISSING where it should be seen, or HIDDEN, and its
     number `edge` (n,) in the table of model edges; `ragged_m` [m] of what is found is no edge but the surface's end, which counts
     half; `edges` (3,) are counts of whole edges by state. Readings where the part should be seen: `readings_world` (m, 3) [m] with
-    their signed `distance` (m,) [m] to the model, in front of it positive; those within `limit_m` agree and leave `rms_m`, NaN if none.
+    their signed `distance` (m,) [m] to the model, in front of it positive; those within `limit_m` agree and leave `rms_m`, None if none.
     `surface_m2` (4,) of the faces that look at the sensor: agrees, seen through, hidden, no reading. `data_pair` and `model_pair`:
     Figure 3 of the two edges that the pose came from, None when they are not known.
     """
@@ -48,7 +48,7 @@ class Explanation(Value):
     readings_world: NDArray
     distance: NDArray
     limit_m: float
-    rms_m: float
+    rms_m: float | None
     surface_m2: NDArray
     data_pair: EdgePair | None = None
     model_pair: EdgePair | None = None
@@ -104,7 +104,7 @@ def explain(
         apply(view.T_world_sensor, readings),
         distance,
         limits.agree,
-        float(np.sqrt(np.mean(agree**2))) if len(agree) else float("nan"),
+        float(np.sqrt(np.mean(agree**2))) if len(agree) else None,
         np.array(surface),
         data_pair,
         model_pair,
@@ -138,16 +138,23 @@ def _whole_edges(samples: PartSamples, states: NDArray) -> NDArray:
 
 def _residuals(view: DepthView, part: Part, T: NDArray, evidence: Evidence, limits: Limits) -> tuple[NDArray, NDArray]:
     """Readings (m, 3) [m] in the sensor's frame at pixels where the part should be seen and nothing nearer hides it, and their signed
-    distances (m,) [m] to its surface."""
+    distances (m,) [m] to the faces that look at the sensor: the table below a part that is not there lies near none of them."""
     drawn = rendered_depth(apply(T, part.solid.vertices), part.solid.triangles, view.depth.shape, evidence.camera)
     with np.errstate(invalid="ignore"):
         v, u = np.nonzero(view.depth - drawn > -limits.hide)
     every = max(1, -(-len(u) // MAX_READINGS))
     v, u = v[::every], u[::every]
     points = view.projection.unproject(np.stack([u, v], axis=-1).astype(float), view.depth[v, u])
-    corners = np.ascontiguousarray(part.solid.vertices[part.solid.triangles])
-    away = _distances(np.ascontiguousarray(apply(inverse(T), points)), corners)
+    away = _distances(np.ascontiguousarray(apply(inverse(T), points)), _facing(view, part, T))
     return points, np.where(view.depth[v, u] <= drawn[v, u], away, -away)
+
+
+def _facing(view: DepthView, part: Part, T: NDArray) -> NDArray:
+    """Triangles (k, 3, 3) [m] of the part, in its frame, that look at the sensor squarely enough to be read."""
+    corners = part.solid.vertices[part.solid.triangles]
+    normal = rotate(T, np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    ray = view.projection.rays(apply(T, corners.mean(axis=1)))
+    return np.ascontiguousarray(corners[-np.einsum("ki,ki->k", normal, ray) >= GRAZING * np.linalg.norm(normal, axis=1)])
 
 
 def _pairs(

@@ -8,7 +8,18 @@ import pytest
 
 from handey_studio.app.actions import CLOSE_UP, Follow, LookFrom, middle_of
 from handey_studio.app.browsing import ROWS, browsed_hypotheses, edges_shown, page_of, wired
-from handey_studio.app.commands import Browse, BrowseRow, FilterEdges, FilterHypotheses, LookAt, PointAt, Select, ShowLayer
+from handey_studio.app.commands import (
+    Browse,
+    BrowseRow,
+    ChoosePart,
+    FilterEdges,
+    FilterHypotheses,
+    LookAt,
+    PointAt,
+    Select,
+    ShowLayer,
+    Undo,
+)
 from handey_studio.app.explaining import Explainer
 from handey_studio.app.jobs import merged
 from handey_studio.app.palette import residual_colours
@@ -95,6 +106,13 @@ def test_looking_is_no_edit(browsing):
     saved = replace(browsing, saved=browsing.session)
     state = after(saved, Browse(1), FilterHypotheses(part="brick"), FilterEdges(0.03), Select("edge", 0))
     assert not state.unsaved and not state.undo
+
+
+def test_setting_up_a_move_ends_the_looking_and_undo_takes_back_the_move_alone(browsing):
+    state = after(browsing, LookAt(3), ChoosePart("brick"))
+    assert state.hypothesis is None and state.command.part == "brick"
+    state = after(state, LookAt(5), Undo())
+    assert state.command.part == "l_block" and number(state) == 5
 
 
 def towards(point):
@@ -214,7 +232,7 @@ def test_what_the_view_says_is_written_with_units_and_nothing_of_it_is_markup(fu
     said = explained(state.session.scene, state.session.parts, 0)
     told = replace(state, explained=Explained(state.session.scene, 0, said))
     text = explained_html(told)
-    assert "found" in text and "mm rms" in text and "in front" in text
+    assert "found" in text and "within the limit" in text and "+2.5 mm" in text
     names = [name for name, *_ in parameters(said)]
     assert names == ["α", "d", "a1", "a2"] and all(data in text and model in text for _, data, model in parameters(said))
     bad = replace(state.session.scene.located.hypotheses[0], part=evil, reason=evil)

@@ -64,19 +64,21 @@ def test_what_lies_under_another_part_is_hidden_and_what_floats_is_seen_through(
     over = from_xyz_rpy((0.48, 0.02, 0.055))
     view = map_from_above([(SLAB.solid, over)], np.random.default_rng(3)).view()
     under = explain(view, CUBE, in_sensor(view, from_xyz_rpy((0.48, 0.02, 0.015))))
-    assert under.edges.tolist() == [0, 0, 12] and len(under.distance) == 0 and np.isnan(under.rms_m)
+    assert under.edges.tolist() == [0, 0, 12] and len(under.distance) == 0 and under.rms_m is None
     assert under.surface_shares[2] == 1.0
+    nothing = explain(view, CUBE, in_sensor(view, from_xyz_rpy((0.62, -0.12, 0.015))))
+    assert nothing.surface_shares[1] == 1.0 and np.median(nothing.distance) == pytest.approx(-0.03, abs=5e-4), "its base is no surface seen"
     above = explain(view, CUBE, in_sensor(view, from_xyz_rpy((0.48, 0.02, 0.165))))
-    assert above.surface_shares[1] == 1.0 and above.distance.max() < -0.05 and np.isnan(above.rms_m)
+    assert above.surface_shares[1] == 1.0 and above.distance.max() < -0.05 and above.rms_m is None
 
 
-def test_distances_are_those_to_the_nearest_point_of_the_mesh(brick_view):
-    wedge = Part("wedge", BRICK.solid)
+def test_distances_are_those_to_the_nearest_point_of_the_faces_seen(brick_view):
     T = STANDING @ from_xyz_rpy((0.004, -0.003, 0.006), (0.2, -0.15, 0.3))
-    said = explain(brick_view, wedge, in_sensor(brick_view, T))
+    said = explain(brick_view, BRICK, in_sensor(brick_view, T))
     assert len(said.distance) > 500
-    mesh = trimesh.Trimesh(apply(T, wedge.solid.vertices), wedge.solid.triangles, process=False)
-    _, slow, _ = trimesh.proximity.closest_point_naive(mesh, said.readings_world[::7])
+    mesh = trimesh.Trimesh(apply(T, BRICK.solid.vertices), BRICK.solid.triangles, process=False)
+    looking_up = mesh.submesh([np.nonzero(mesh.face_normals[:, 2] > 0.12)[0]], append=True)
+    _, slow, _ = trimesh.proximity.closest_point_naive(looking_up, said.readings_world[::7])
     np.testing.assert_allclose(np.abs(said.distance[::7]), slow, atol=1e-9)
     inside = mesh.ray.contains_points(said.readings_world[::7])
     clear = slow > 1e-6

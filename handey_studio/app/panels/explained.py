@@ -1,6 +1,5 @@
 """What speaks for and against the hypothesis that is looked at, in numbers, with the legends of what the scene shows of it."""
 
-import math
 from collections.abc import Sequence
 
 from numpy.typing import NDArray
@@ -56,7 +55,7 @@ def _residuals(said: Explanation) -> str:
     limit = 1e3 * said.limit_m
     stops = ", ".join(f"{css(colour)} {50 * (1 + at):.0f}%" for colour, at in zip(palette.RESIDUAL, palette.RESIDUAL_AT, strict=True))
     ticks = "".join(f"<span>{word}</span>" for word in (f"−{limit:.1f} mm, behind", "0", f"in front, +{limit:.1f} mm"))
-    rms = "none agrees" if math.isnan(said.rms_m) else f"{1e3 * said.rms_m:.2f} mm rms of those within the limit"
+    rms = "none is within the limit" if said.rms_m is None else f"{1e3 * said.rms_m:.2f} mm rms of those within the limit"
     return (
         _head("Residuals of readings to the model")
         + f'<div style="height:9px;border-radius:3px;border:1px solid #dde2e8;background:linear-gradient(90deg,{stops})"></div>'

@@ -64,7 +64,8 @@ class DestinationScene:
         place(self._gizmo, pose)
         fixed = (state.command is not None and state.command.to.startswith("on:")) or state.job is not None
         self._gizmo.disable_axes = self._gizmo.disable_sliders = self._gizmo.disable_rotations = fixed
-        self._gizmo.visible = "destination" not in state.session.view.hidden_layers and not _arrived(state)
+        shown = "destination" not in state.session.view.hidden_layers and state.hypothesis is None
+        self._gizmo.visible = shown and not _arrived(state)
 
 
 def ghost_pose(state: State) -> NDArray | None:
@@ -94,4 +95,5 @@ def _pose_of(gizmo: Any) -> NDArray:
 
 def _looks(state: State) -> tuple:
     session = state.session
-    return state.loads, session.commands, session.located, session.view.hidden_layers, state.job is None, session.result, _arrived(state)
+    shown = session.view.hidden_layers, state.hypothesis is None, _arrived(state)
+    return state.loads, session.commands, session.located, state.job is None, session.result, shown

@@ -13,7 +13,7 @@ from handey_studio.localization.explain import Explanation
 ROOT = "/pair"
 DATA, MODEL = palette.BLUE, palette.SKY
 LIFT_M = np.array([0.0, 0.0, 0.0016])
-ARC_SHARE = 0.28  # of the shorter model edge
+ARC_SHARE = 0.28  # of the shorter edge of the model, of which a data edge may be a small piece
 TEXT_SHARE = 0.27  # of the arc's radius
 
 
@@ -37,7 +37,7 @@ class PairScene:
             self._figure(said, said.data_pair)
 
     def _figure(self, said: Explanation, pair: EdgePair) -> None:
-        radius = arc_radius(pair)
+        radius = arc_radius(said.model_pair or pair)
         arc = pair.arc(radius)
         self._lines("data_edges", pair.ends, DATA, 9.0)
         self._lines("perpendicular", pair.feet[None], palette.INK, 3.0)

@@ -71,7 +71,7 @@ class PartsScene:
             place(self._frames[placed.name], T)
             self._frames[placed.name].visible = "located parts" not in hidden
             self._faces[placed.name].visible = moved or state.hypothesis is None  # readings are looked at beneath those that stand
-            self._labels[placed.name].visible = "labels" not in hidden
+            self._labels[placed.name].visible = "labels" not in hidden and state.hypothesis is None
 
 
 def _looks(state: State) -> tuple:
