@@ -16,6 +16,7 @@ from handey_studio.base.files import replace_file
 from handey_studio.world import Library
 
 if TYPE_CHECKING:
+    from handey_studio.sensing.depth_view import DepthView
     from handey_studio.session import Session
     from handey_studio.task import MoveCommand, MoveResult
 
@@ -107,6 +108,7 @@ def _locate_arguments(locate: argparse.ArgumentParser) -> None:
     locate.add_argument("--max-poses", type=_positive, default=5, help="at most this many of each part (default: 5)")
     locate.add_argument("--seed", type=int, default=0)
     locate.add_argument("--json", required=True, type=Path, help="where the poses go")
+    locate.add_argument("--depth-map", type=Path, metavar="MAP.npz", help="where the grid of elevations goes, for a recorded cell")
 
 
 def _scan_arguments(scan: argparse.ArgumentParser) -> None:
@@ -182,7 +184,8 @@ def _locate(given: argparse.Namespace) -> int:
     from handey_studio.sensing.report import seen_report
     from handey_studio.sensing.support import support_planes
 
-    _check_output(given.json)
+    for output in (given.json, given.depth_map):
+        _check_output(output)
     library = Library.choose(given.library)
     parts = [library.part(name, given.part_scale) for name in given.part]
     begun = time.perf_counter()
@@ -195,6 +198,8 @@ def _locate(given: argparse.Namespace) -> int:
         view = replace(view, T_world_sensor=supports.table.T_world_sensor)
         options = options if supports.table.found else replace(options, table_z_m=None)
         timing["support"] = time.perf_counter() - begun
+    if given.depth_map:
+        _keep_map(given.depth_map, view)
     result = localize(view, parts, options, rng)
     report = locate_report(result, view.T_world_sensor, timing) | seen_report(reading, supports)
     for pose in report["poses"]:
@@ -295,6 +300,16 @@ def _scan_simulate(given: argparse.Namespace) -> int:
         print(f"  handey scan calibrate {given.out / 'boards'} --board 9x6 --square-mm 20 {steps} --out finder.json")
     print(f"  handey scan {given.out / 'stripes'} --calibration {'finder.json' if given.rig == 'stage' else true} --cloud cloud.ply")
     return DONE
+
+
+def _keep_map(path: Path, view: "DepthView") -> None:
+    from handey_studio.cell.recorded import write_depth_map
+    from handey_studio.sensing.view_map import depth_map_of
+
+    try:
+        write_depth_map(path, depth_map_of(view))
+    except OSError as error:
+        raise BadInput(f'"{path}" cannot be written: {error.strerror}.') from None
 
 
 def _move(given: argparse.Namespace) -> int:
