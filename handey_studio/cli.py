@@ -96,6 +96,7 @@ def _bench_arguments(bench: argparse.ArgumentParser) -> None:
     locate.add_argument("--sensor", choices=("camera", "range_finder"), default="camera", help="what sees new scenes (default: camera)")
     locate.add_argument("--peers", action="store_true", help="ask Open3D and OpenCV the same questions, as far as they are installed")
     locate.add_argument("--peer-python", metavar="PYTHON", help="interpreter of the environment that holds the peers (default: this one)")
+    locate.add_argument("--peer-poses", type=_positive, default=1, help="poses that each peer may report for a part (default: 1, its best)")
     locate.add_argument("--plot", type=Path, help="draw recall, precision and time into a .png, .svg or .pdf")
 
 
@@ -413,6 +414,7 @@ def _bench_locate(given: argparse.Namespace) -> dict[str, Any]:
         sensor=given.sensor,
         peers=given.peers,
         peer_python=given.peer_python,
+        peer_poses=given.peer_poses,
         plot_to=given.plot,
     )
 

@@ -243,7 +243,11 @@ class Middle:
         T[:3, 3] = points.mean(axis=0) - model
         return T, float(points.shape[0] > 50)
 
-peer_worker.peers = lambda voxels: {{"middle": Middle()}} if {some} else {{}}
+class Knowing(Middle):
+    def locate(self, model, points):
+        return np.array({T}), 1.0
+
+peer_worker.peers = lambda voxels: {{"middle": Middle(), "knowing": Knowing()}} if {some} else {{}}
 peer_worker.main()
 """
 
@@ -252,7 +256,7 @@ peer_worker.main()
 def toy(tmp_path, monkeypatch):
     def make(some):
         script = tmp_path / "toy.py"
-        script.write_text(TOY.format(folder=str(peers.WORKER.parent), some=some))
+        script.write_text(TOY.format(folder=str(peers.WORKER.parent), some=some, T=(inverse(T_WORLD_SENSOR) @ CARTON_AT).tolist()))
         monkeypatch.setattr(peers, "WORKER", script)
 
     return make
@@ -264,15 +268,17 @@ def test_a_peer_sees_what_lies_above_the_table(labelled, toy):
     alone = np.where(seen.body == 2, np.nan, seen.depth)  # the carton and the table
     scene = LabelledScene("a", DepthView(alone, camera.projection, T_WORLD_SENSOR), True, (CARTON,), judge=None)
     with peers.PeerProcess() as process:
-        assert process.names == ("middle",)
+        assert process.names == ("middle", "knowing")
         peer = peers.Peer(process, "middle")
         peer.see(scene)
         answer = peer.locate(CARTON)
         off = T_WORLD_SENSOR @ answer.poses[0].T_sensor_part[:, 3] - CARTON_AT[:, 3]
         assert np.abs(off[:2]).max() < 0.01 and 0.0 < off[2] < 0.03 and answer.seconds > 0
+        once = peers.Peer(process, "knowing", most=3).locate(CARTON)
+        assert len(once.poses) == 1  # the points that it explains are gone, and hardly any are left
         peer.see(replace(scene, view=DepthView(np.where(seen.body == 0, seen.depth, np.nan), camera.projection, T_WORLD_SENSOR)))
         nothing = peer.locate(CARTON)
-        assert nothing.poses == () and "fitness" in nothing.reason
+        assert nothing.poses == () and "too few points" in nothing.reason
 
 
 def test_without_peers_one_sentence_tells_how_to_get_them(toy):

@@ -28,6 +28,7 @@ def run_bench(
     sensor: str = CAMERA,
     peers: bool = False,
     peer_python: str | None = None,
+    peer_poses: int = 1,
     plot_to: Path | None = None,
 ) -> dict[str, Any]:
     """Measure and tell. Scenes are those in the folder `scenes`; with `seeds`, those seeds' simulated ones as `sensor` sees them, made
@@ -37,7 +38,7 @@ def run_bench(
         methods: list[Method] = [Handey()]
         if peers or peer_python is not None:
             process = open_things.enter_context(PeerProcess(peer_python))
-            methods += [Peer(process, name) for name in process.names]
+            methods += [Peer(process, name, peer_poses) for name in process.names]
         if scenes is not None and seeds is None:
             folders = scene_folders(scenes)
         else:

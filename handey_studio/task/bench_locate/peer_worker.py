@@ -21,6 +21,8 @@ PPF_STEP = (
 )
 PPF_VOXEL_M = 0.0025  # between points of the scene, and of the model that poses are refined with
 PPF_POSES = 30  # the best clusters that are refined
+LEAST_POINTS = 50  # above the table; with fewer nobody is asked
+EXPLAINED_M = 0.003  # points in voxels of this size at a found part's surface, or next to such, are explained by it
 SCENE_VOXELS = 0.5  # points of the scene that poses are refined on, in voxels apart
 
 
@@ -156,6 +158,7 @@ class Worker:
     def __init__(self) -> None:
         self.peers: dict[str, Peer] = {}
         self.models: dict[tuple[str, str], Any] = {}
+        self.surfaces: dict[str, NDArray] = {}
         self.points = np.zeros((0, 3))
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -167,20 +170,31 @@ class Worker:
 
     def do_part(self, request: dict[str, Any]) -> dict[str, Any]:
         arrays = np.load(request["file"])
+        self.surfaces[request["part"]] = arrays["points"]
         for name, peer in self.peers.items():
             self.models[name, request["part"]] = peer.learn(arrays["points"], arrays["normals"])
         return {}
 
     def do_scene(self, request: dict[str, Any]) -> dict[str, Any]:
         arrays = np.load(request["file"])
-        self.points = arrays["points"]
-        self.above = (self.points @ arrays["up"] - arrays["table"]) > arrays["clearance"]
+        points = arrays["points"]
+        self.points = points[(points @ arrays["up"] - arrays["table"]) > arrays["clearance"]]
         return {}
 
     def do_locate(self, request: dict[str, Any]) -> dict[str, Any]:
-        begun = time.perf_counter()
-        T, fitness = self.peers[request["peer"]].locate(self.models[request["peer"], request["part"]], self.points[self.above])
-        return {"T_sensor_part": T.tolist(), "fitness": fitness, "seconds": time.perf_counter() - begun}
+        """The best pose and its seconds; then, while poses are at least `least` fit, the best one without the points they explain."""
+        peer, model = self.peers[request["peer"]], self.models[request["peer"], request["part"]]
+        points, poses, seconds = self.points, [], 0.0
+        while len(poses) < request["most"] and len(points) >= LEAST_POINTS:
+            begun = time.perf_counter()
+            T, fitness = peer.locate(model, points)
+            seconds = seconds or time.perf_counter() - begun
+            poses.append({"T_sensor_part": T.tolist(), "fitness": fitness})
+            if fitness < request["least"]:
+                break
+            surface = self.surfaces[request["part"]] @ T[:3, :3].T + T[:3, 3]
+            points = points[~np.isin(_keys(np.floor(points / EXPLAINED_M).astype(np.int64)), around(surface, EXPLAINED_M))]
+        return {"poses": poses, "seconds": seconds}
 
 
 def main() -> None:

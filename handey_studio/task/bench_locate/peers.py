@@ -99,21 +99,24 @@ class PeerProcess:
 
 
 class Peer:
-    """One of a worker's peers as a method; it stands by its best pose if its fitness is high enough."""
+    """One of a worker's peers as a method: its best pose, and with `most` above one the next ones without what those before explain. It
+    stands by a pose whose fitness is high enough. Its seconds are those of the first."""
 
-    def __init__(self, process: PeerProcess, name: str) -> None:
-        self._process, self.name = process, name
+    def __init__(self, process: PeerProcess, name: str, most: int = 1) -> None:
+        self._process, self.name, self._most = process, name, most
 
     def see(self, scene: LabelledScene) -> None:
         self._process.show(scene)
 
     def locate(self, part: Part) -> Answer:
         self._process.teach(part)
-        told = self._process.ask(do="locate", peer=self.name, part=part.name)
-        pose = Pose(np.array(told["T_sensor_part"]), told["fitness"])
-        if told["fitness"] < LEAST_FITNESS:
-            return Answer((), told["seconds"], f"fitness {told['fitness']:.2f}, limit {LEAST_FITNESS}")
-        return Answer((pose,), told["seconds"])
+        told = self._process.ask(do="locate", peer=self.name, part=part.name, most=self._most, least=LEAST_FITNESS)
+        poses = [Pose(np.array(pose["T_sensor_part"]), pose["fitness"]) for pose in told["poses"]]
+        fit = tuple(pose for pose in poses if pose.score >= LEAST_FITNESS)
+        if fit:
+            return Answer(fit, told["seconds"])
+        reason = f"fitness {poses[0].score:.2f}, limit {LEAST_FITNESS}" if poses else "too few points above the table"
+        return Answer((), told["seconds"], reason)
 
 
 def surface_points(solid: Polyhedron, count: int, rng: np.random.Generator) -> tuple[NDArray, NDArray]:

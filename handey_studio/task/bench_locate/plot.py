@@ -34,7 +34,7 @@ def plot(summary: dict[str, Any], path: Path) -> None:
     colours: dict[str, str] = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(summary)}
     _recall(recall, summary, colours)
     _bars(precision, {name: 100 * (numbers["precision"] or 0.0) for name, numbers in summary.items()}, colours, "{:.1f} %")
-    precision.set(title="precision: reported poses that are right", xlim=(0, 118), xlabel="%")
+    precision.set(title="precision of reported poses", xlim=(0, 118), xlabel="%")
     _bars(seconds, {name: 1e3 * numbers["seconds"]["median"] for name, numbers in summary.items()}, colours, "{:.0f} ms")
     longest = max(numbers["seconds"]["median"] for numbers in summary.values())
     seconds.set(title="median time a part", xscale="log", xlim=(10, 1e4 * longest), xlabel="ms")
@@ -51,7 +51,7 @@ def _recall(axes: Any, summary: dict[str, Any], colours: dict[str, str]) -> None
     """First answers of everyone; of methods that report several poses also all instances. How many questions a bin holds stands below."""
     for name, numbers in summary.items():
         _line(axes, numbers["bins"], "first", colours[name], "-o", f"{name}, first answer")
-        if numbers["poses"] > numbers["questions"]:
+        if numbers["most_poses"] > 1:
             _line(axes, numbers["bins"], "instances", colours[name], "--s", f"{name}, all instances")
     for cell in next(iter(summary.values()))["bins"]:
         text = f"{cell['instances']['count']}\n{cell['first']['count']}"

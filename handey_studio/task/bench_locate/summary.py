@@ -34,6 +34,7 @@ def _of_method(rows: Sequence[Row]) -> dict[str, Any]:
         "first_half_hidden": _first_recall(rows, COUNTED, PLAIN),
         "bins": [_bin(rows, k / BINS, (k + 1) / BINS) for k in range(BINS)],
         "poses": len(poses),
+        "most_poses": max((len(row["poses"]) for row in rows), default=0),
         "precision": _share(pose["right"] for pose in poses),
         "false_share": _share(not pose["right"] for pose in poses),
         "off_mm": _spread(pose["off_mm"] for pose in right),
