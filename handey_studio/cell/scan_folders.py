@@ -19,7 +19,7 @@ from handey_studio.cell.chessboard import THICK_M, Chessboard, board_poses, pain
 from handey_studio.cell.photographs import Exposure, Paint, body_paint, develop, look, stripe_light
 from handey_studio.cell.stripes import Surfaces
 from handey_studio.geometry.transforms import apply, inverse, transform
-from handey_studio.sensing.instrument import Instrument, instrument_of
+from handey_studio.sensing.instrument import MAX_CELL_M, Instrument, instrument_of
 from handey_studio.sensing.instrument_file import write_instrument
 from handey_studio.sensing.laser_planes import moved_planes
 from handey_studio.sensing.range_finder import RangeFinder
@@ -66,9 +66,14 @@ def stage_instrument(finder: RangeFinder, stripes: int) -> Instrument:
         rig_step=transform(None, (width / (stripes - 1), 0.0, 0.0)),
         T_world_range=finder.T_world_range,
         area=finder.area,
-        cell=max(finder.cell, round(width / stripes, 4)),
+        cell=_cell(finder, width / stripes),
         max_height=finder.max_height,
     )
+
+
+def _cell(finder: RangeFinder, spacing: float) -> float:
+    """Side [m] of cells in which every stripe leaves a reading."""
+    return min(max(finder.cell, round(spacing, 4)), MAX_CELL_M)
 
 
 def moved_steps(instrument: Instrument) -> int:
@@ -147,7 +152,7 @@ def write_sweep_folder(
     """
     finder = replace(finder, planes=options.stripes)
     spacing = 2.0 * float(finder.laser[2]) * finder.sweep_rad / (finder.planes - 1)
-    instrument = replace(instrument_of(finder), cell=max(finder.cell, round(spacing, 4)))
+    instrument = replace(instrument_of(finder), cell=_cell(finder, spacing))
     _new_folders(folder, STRIPES)
     _write_true(folder, instrument)
     placed = _in_range(bodies, finder)

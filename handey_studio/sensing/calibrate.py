@@ -138,8 +138,11 @@ def _find_boards(paths: Sequence[Path], board: Board, left_out: dict[str, str], 
 
 def _corners(photograph: Photograph, board: Board) -> NDArray | None:
     """The board in a photograph: in all its light, else in the colour in which a laser across it may be dark."""
-    looks = [photograph.light.mean(axis=2), *(photograph.light[..., channel] for channel in (0, 2, 1))]
-    return next((corners for grey in looks if (corners := find_corners(grey, board)) is not None), None)
+    corners = find_corners(photograph.light.mean(axis=2), board)
+    if corners is not None:
+        return corners
+    singles = (find_corners(photograph.light[..., channel], board, thorough=False) for channel in (0, 2, 1))
+    return next((corners for corners in singles if corners is not None), None)
 
 
 def _calibration(

@@ -14,6 +14,7 @@ from handey_studio.sensing.range_finder import RangeFinder
 from handey_studio.sensing.stripe_camera import StripeCamera
 
 MAX_SIDE_CELLS = 4096
+MIN_CELL_M, MAX_CELL_M = 0.0001, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +60,9 @@ class Instrument(Value):
                 raise BadInput("T_world_range and the rig's step and poses must be rigid 4×4 transforms: a proper rotation, metres.")
 
     def _check_area(self) -> None:
-        if not 0.0001 <= self.cell <= 0.02 or not 0 < self.max_height <= 10.0:
-            raise BadInput(f"cells of {self.cell} m and a height of {self.max_height} m: they take 0.0001–0.02 m and up to 10 m.")
+        if not MIN_CELL_M <= self.cell <= MAX_CELL_M or not 0 < self.max_height <= 10.0:
+            limits = f"{MIN_CELL_M:g}–{MAX_CELL_M:g} m and up to 10 m"
+            raise BadInput(f"cells of {self.cell} m and a height of {self.max_height} m are not usable; they take {limits}.")
         sides = self.area or (self.cell, self.cell)
         if not all(self.cell <= side <= MAX_SIDE_CELLS * self.cell for side in sides):
             raise BadInput(f"an area of {sides} m in cells of {self.cell} m: a side takes one cell to {MAX_SIDE_CELLS}.")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from handey_studio.base import BadInput
 from handey_studio.base.files import replace_file
 from handey_studio.geometry.transforms import is_rigid
-from handey_studio.sensing.instrument import Instrument
+from handey_studio.sensing.instrument import MAX_CELL_M, MIN_CELL_M, Instrument
 from handey_studio.sensing.laser_planes import plane_through, turning_planes
 from handey_studio.sensing.stripe_camera import LENS_COEFFICIENTS, StripeCamera
 
@@ -101,7 +101,7 @@ def _instrument(given: dict[str, Any]) -> Instrument:
         rig_step=_rigid(rig, "step") if "step" in rig else None,
         T_world_range=_rigid(given, "T_world_range") if "T_world_range" in given else np.eye(4),
         area=_pair(given, "area_m") if "area_m" in given else None,
-        cell=_number(given, "cell_m", 0.0001, 0.02) if "cell_m" in given else 0.001,
+        cell=_number(given, "cell_m", MIN_CELL_M, MAX_CELL_M) if "cell_m" in given else 0.001,
         max_height=_number(given, "max_height_m", 0.001, 10.0) if "max_height_m" in given else 1.0,
     )
 
@@ -156,7 +156,7 @@ def _name(camera: dict[str, Any]) -> str:
 def _number(given: dict[str, Any], key: str, low: float, high: float) -> float:
     value = given.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise BadInput(f'"{key}" is {str(value)[:40]}; it must be a number from {low:g} to {high:g}.')
+        raise BadInput(f'"{key}" is {str(value)[:40]!r}; it must be a number from {low:g} to {high:g}.')
     return float(value)
 
 

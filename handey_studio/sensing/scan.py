@@ -14,7 +14,7 @@ from handey_studio.base import BadInput, Progress, Share, Silent
 from handey_studio.geometry.transforms import apply, transform
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.sensing.fusing import ScanArea, fuse_readings, inside
-from handey_studio.sensing.instrument import MAX_SIDE_CELLS, Instrument
+from handey_studio.sensing.instrument import MAX_CELL_M, MAX_SIDE_CELLS, Instrument
 from handey_studio.sensing.photographs import Photograph, dark_frame_of, list_photographs, read_photograph
 from handey_studio.sensing.stripe_camera import StripeCamera, points_on_planes
 from handey_studio.sensing.stripe_light import LaserColour, laser_colour, laser_light
@@ -25,7 +25,6 @@ MAX_POINTS = 20_000_000
 SPAN = (0.002, 0.998)  # quantiles of the readings that a depth map without a given area spans
 LEAST_NOISE_M = 1e-5
 NUDGE_PX = 0.25  # by which a peak is moved to see how far its point moves
-MAX_CELL_M = 0.02
 SPACING_LOOKS = 40  # photographs, and points of each, by which the stripes' spacing is measured
 GRAZING = "grazing the plane"
 
