@@ -22,6 +22,7 @@ MAX_GAP_PX = 40  # a hole wider than this hides whatever comes after it
 JUMP_SIGMAS = 5.0  # a jump stands out by this many sigmas of a reading
 WEAK = 0.6  # share of that which a jump may sink to along an edge
 CREASE_LOW, CREASE_HIGH = 0.28, 0.5  # rad; between the noise of normals and the bluntest edge that is looked for
+LEAST_WAY = 2  # px on either side, without which no turn is told
 CREASE_SCALE = 1000.0  # turns [rad] as Canny's whole numbers
 
 
@@ -43,7 +44,7 @@ def edge_pixels(view: DepthView, surface: Surface) -> EdgePixels:
     camera, noise = camera_of(view.projection), (view.noise, surface.typical)
     strength, outward = _jumps(np.asarray(view.depth), surface.slope, surface.normals, camera, noise, 0.15 * surface.pixel)
     jump = _hysteresis(strength, WEAK * JUMP_SIGMAS, JUMP_SIGMAS)
-    kind = _creases(view, surface)
+    kind = _creases(view, surface, jump, outward)
     kind[cv2.dilate(jump, np.ones((3, 3), np.uint8)) > 0] = NONE
     kind[jump > 0] = JUMP
     for array in (kind, outward):
@@ -135,12 +136,28 @@ def _jumps(depth: NDArray, slope: NDArray, normals: NDArray, camera: Camera, noi
     return strength, outward
 
 
-def _creases(view: DepthView, surface: Surface) -> NDArray:
+def _creases(view: DepthView, surface: Surface, jump: NDArray, outward: NDArray) -> NDArray:
     """(H, W) uint8 NONE, CONVEX or CONCAVE: Canny's thinning and hysteresis over the turn of the normal."""
-    camera = camera_of(view.projection)
-    dx, dy, bend = _turns(np.asarray(view.depth), surface.normals, camera, surface.radius_px, 3.0 * view.noise)
+    camera, r = camera_of(view.projection), surface.radius_px
+    right, down = _free_way(jump, outward, r)
+    dx, dy, bend = _turns(np.asarray(view.depth), surface.normals, camera, right, down, r, 3.0 * view.noise)
     edges = cv2.Canny(dx, dy, CREASE_SCALE * CREASE_LOW, CREASE_SCALE * CREASE_HIGH, L2gradient=True)
     return edges & bend  # Canny marks with all bits
+
+
+@njit(cache=True)
+def _free_way(jump: NDArray, outward: NDArray, r: int) -> tuple[NDArray, NDArray]:
+    """How many pixels (H, W) uint8, up to r, one can go right and down before a jump: past it lies another surface."""
+    height, width = jump.shape
+    right, down = np.zeros((height, width), dtype=np.uint8), np.zeros((height, width), dtype=np.uint8)
+    for v in range(height - 1, -1, -1):
+        for u in range(width - 1, -1, -1):
+            here = jump[v, u] > 0
+            if u + 1 < width and not (here and outward[v, u, 0] > 0) and not (jump[v, u + 1] and outward[v, u + 1, 0] < 0):
+                right[v, u] = min(r, right[v, u + 1] + 1)
+            if v + 1 < height and not (here and outward[v, u, 1] > 0) and not (jump[v + 1, u] and outward[v + 1, u, 1] < 0):
+                down[v, u] = min(r, down[v + 1, u] + 1)
+    return right, down
 
 
 @njit(cache=True, inline="always")
@@ -172,22 +189,29 @@ def _turn(depth, normals, camera, v1, u1, v2, u2, change, slack):
 
 
 @njit(cache=True)
-def _turns(depth: NDArray, normals: NDArray, camera: Camera, r: int, slack: float) -> tuple[NDArray, NDArray, NDArray]:
-    """The turn of the normal over the window's width along u and along v (H, W) int16, of one sign where they go the same
-    way, and the kind of crease that it would be."""
+def _turns(
+    depth: NDArray, normals: NDArray, camera: Camera, right: NDArray, down: NDArray, r: int, slack: float
+) -> tuple[NDArray, NDArray, NDArray]:
+    """The turn of the normal over the window's width, or as far as a jump lets one go, along u and along v (H, W) int16, of one
+    sign where they go the same way, and the kind of crease that it would be."""
     height, width = depth.shape
     dx, dy = np.zeros((height, width), dtype=np.int16), np.zeros((height, width), dtype=np.int16)
     kind = np.zeros((height, width), dtype=np.uint8)
     least = (0.5 * CREASE_LOW) ** 2  # of the two together: flatter is no crease, nor beside one
     nothing = (np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(0.0))
+    above = np.zeros(width, dtype=np.int64)
     for v in range(height):
+        left = 0
         for u in range(width):
-            e = _change(normals, v, u - r, v, u + r) if r <= u < width - r else nothing
-            f = _change(normals, v - r, u, v + r, u) if r <= v < height - r else nothing
+            left = min(r, left + 1) if u > 0 and right[v, u - 1] > 0 else 0
+            above[u] = min(r, above[u] + 1) if v > 0 and down[v - 1, u] > 0 else 0
+            after, below = int(right[v, u]), int(down[v, u])
+            e = _change(normals, v, u - left, v, u + after) if min(left, after) >= LEAST_WAY else nothing
+            f = _change(normals, v - above[u], u, v + below, u) if min(above[u], below) >= LEAST_WAY else nothing
             if e[3] + f[3] < least:
                 continue
-            turn_u, bend_u = _turn(depth, normals, camera, v, u - r, v, u + r, e, slack)
-            turn_v, bend_v = _turn(depth, normals, camera, v - r, u, v + r, u, f, slack)
+            turn_u, bend_u = _turn(depth, normals, camera, v, u - left, v, u + after, e, slack)
+            turn_v, bend_v = _turn(depth, normals, camera, v - above[u], u, v + below, u, f, slack)
             opposite = turn_u > 0.0 and turn_v > 0.0 and e[0] * f[0] + e[1] * f[1] + e[2] * f[2] < 0.0
             dx[v, u] = int(CREASE_SCALE * turn_u)
             dy[v, u] = int(CREASE_SCALE * (-turn_v if opposite else turn_v))

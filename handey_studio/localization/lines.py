@@ -11,11 +11,22 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.flanks import Run, Seen, flank, space_normal, space_point, w_of, w_sigma
-from handey_studio.localization.runs import STEP_SIGMA, outline, own_level, pixel_variances, rough_plane, straight_run
-from handey_studio.localization.surface import Camera
+from handey_studio.localization.runs import (
+    MIN_PIXELS,
+    MIN_PLACES,
+    STEP_SIGMA,
+    outline,
+    own_level,
+    pixel_variances,
+    rough_plane,
+    straight_run,
+)
+from handey_studio.localization.surface import Camera, reading_sigma
 
-LEAST_TURN = np.deg2rad(8.0)  # between the planes of a crease for their intersection to be better than its pixels
+LEAST_TURN = np.deg2rad(10.0)  # between the planes beside a crease
+PLAIN_TURN, SURE_TURN = np.deg2rad(25.0), 2.0  # a turn that is less plain than this must stand out by these sigmas
 MAX_MEET = 4.0  # px that an intersection may lie off its pixels
+WILD = 4.0  # sigmas that pixels may lie off a silhouette, rms, besides two pixels and the outline error: else they are no line
 THINNED = 0.3  # of the window's radius: how far thinned pixels may lie beside their crease
 
 
@@ -97,7 +108,7 @@ def _off(seen: Seen, run: Run, rms: float, level: NDArray, u: NDArray, v: NDArra
 def silhouette(seen: Seen, outward: NDArray, u: NDArray, v: NDArray) -> Line:
     """The line of a jump's pixels, on the plane of the nearer surface."""
     x, y, tells, systematic = outline(seen, outward, u, v)
-    run, keep, rms = straight_run(x, y, tells)
+    run, keep, rms = straight_run(x, y, tells, MIN_PLACES)
     if run.half < 1.0:
         return _empty()
     inwards = 0.0
@@ -117,12 +128,16 @@ def silhouette(seen: Seen, outward: NDArray, u: NDArray, v: NDArray) -> Line:
     ends, normals, inward, metres = _line(run, level, planes, sides, flanks, seen.camera)
     direction = (ends[1] - ends[0]) / (2.0 * run.half * metres)
     pixels = int(keep.sum())
+    sigma_depth = reading_sigma(w_of(level[0], seen.camera), seen.camera, seen.noise)
     at_middle, tilt = pixel_variances(run, rms, pixels, systematic, STEP_SIGMA)
     moves = np.zeros((2, 3))
     moves[0] = _across(run, plane, direction, seen.camera)
     moves[1] = _deeper(run, level, direction, seen.camera)
     offset, angle = _sigmas(moves, np.array([at_middle, covariance[0, 0]]), np.array([tilt, covariance[1, 1]]), metres)
-    return Line(pixels, ends, normals, inward, flanks, _off(seen, run, rms, level, u, v, keep, metres), offset, angle)
+    off = _off(seen, run, rms, level, u, v, keep, metres)
+    if off > WILD * sigma_depth + 2.0 * metres + seen.outline:
+        return _empty()
+    return Line(pixels, ends, normals, inward, flanks, off, offset, angle)
 
 
 @njit(cache=True)
@@ -147,29 +162,40 @@ def _met(run: Run, p: NDArray, q: NDArray) -> tuple[Run, bool]:
 
 @njit(cache=True)
 def crease(seen: Seen, u: NDArray, v: NDArray) -> Line:
-    """The line in which the planes beside a crease's pixels meet; through the pixels where there are no such planes."""
+    """The line in which the planes beside a crease's pixels meet; through the pixels where there are no such planes; none where the planes
+    are one."""
     everything = np.ones(len(u), dtype=np.bool_)
-    run, keep, rms = straight_run(u, v, everything)
+    run, keep, rms = straight_run(u, v, everything, MIN_PIXELS)
     if run.half < 1.0:
         return _empty()
     beside = max(seen.radius - 1.0, 2.0)
     planes, sides = np.zeros((2, 3)), np.array([1.0, -1.0])
     covariances = np.zeros((2, 3, 3))
-    met, counts = False, np.zeros(2, dtype=np.int64)
+    counts = np.zeros(2, dtype=np.int64)
     at = run
     for again in range(2):
         for k in range(2):
             counts[k], planes[k], covariances[k] = flank(seen, at, sides[k], 2.0 - again, beside)
-        met = counts[0] > 0 and counts[1] > 0
-        if met:
-            turn = np.sum(space_normal(at, planes[0], seen.camera) * space_normal(at, planes[1], seen.camera))
-            moved, along = _met(at, planes[0], planes[1])
-            met = turn < np.cos(LEAST_TURN) and along
-            if met and again == 0:
-                at = moved
+        if counts[0] == 0 or counts[1] == 0:
+            break
+        if not _turns(space_normal(at, planes[0], seen.camera), space_normal(at, planes[1], seen.camera), planes, covariances):
+            return _empty()
+        moved, met = _met(at, planes[0], planes[1])
         if not met:
             break
-    return _meeting(seen, at, planes, covariances, u, v, keep) if met else _ridge(seen, run, rms, u, v, keep, beside)
+        if again == 1:
+            return _meeting(seen, at, planes, covariances, u, v, keep)
+        at = moved
+    return _ridge(seen, run, rms, u, v, keep, beside)
+
+
+@njit(cache=True)
+def _turns(a: NDArray, b: NDArray, planes: NDArray, covariances: NDArray) -> bool:
+    """Whether the surface truly turns: noise alone makes slight creases in the windows' slopes, which wide planes do not bear out."""
+    cosine = np.sum(a * b)
+    sigma = np.sqrt(covariances[0, 2, 2] + covariances[1, 2, 2])
+    sure = abs(planes[0, 2] - planes[1, 2]) > SURE_TURN * sigma
+    return cosine < np.cos(LEAST_TURN) and (sure or cosine < np.cos(PLAIN_TURN))
 
 
 @njit(cache=True)

@@ -9,6 +9,7 @@ from handey_studio.localization.surface import pixel_size
 
 MIN_PIXELS = 10
 TRIM = 2.5  # sigmas; rounds of trimming take the corners' rounding off a run
+MIN_PLACES = 6  # along a silhouette
 STEP_SIGMA = 0.29  # px; of a place known to lie somewhere within one pixel
 RAGGED_PX = 1.5  # a sensor that loses more than this at silhouettes loses it all along them
 
@@ -63,20 +64,34 @@ def outline(seen: Seen, outward: NDArray, u: NDArray, v: NDArray) -> tuple[NDArr
         systematic += min(STEP_SIGMA * (k - 1), 0.4 * lost) + (0.5 * lost if lost > RAGGED_PX else 0.0)
         x[i] += sign * (1 - axis) * on
         y[i] += sign * axis * on
-    if tells.sum() < MIN_PIXELS:
-        tells[:] = True
+    _nearest_only(seen.depth, u, v, v if axis == 0 else u, tells)
     return x, y, tells, systematic / len(u)
 
 
 @njit(cache=True)
-def straight_run(x: NDArray, y: NDArray, tells: NDArray) -> tuple[Run, NDArray, float]:
+def _nearest_only(depth: NDArray, u: NDArray, v: NDArray, place: NDArray, tells: NDArray) -> None:
+    """Leaves one pixel at each place along a silhouette, the nearest: a face seen edge-on is a band of jumps behind its own edge."""
+    first = int(place.min())
+    best = np.full(int(place.max()) - first + 1, -1)
+    for i in range(len(u)):
+        k = int(place[i]) - first
+        if tells[i] and (best[k] < 0 or depth[int(v[i]), int(u[i])] < depth[int(v[best[k]]), int(u[best[k]])]):
+            best[k] = i
+    tells[:] = False
+    for k in best:
+        if k >= 0:
+            tells[k] = True
+
+
+@njit(cache=True)
+def straight_run(x: NDArray, y: NDArray, tells: NDArray, least: int) -> tuple[Run, NDArray, float]:
     """The run through pixels, which of them keep to it, and their rms off it [px]."""
     keep = tells.copy()
     mu, mv, du, dv, rms = axis_of(x, y, keep)
     for _ in range(3):
         across = (y - mv) * du - (x - mu) * dv
         keep = tells & (np.abs(across) <= TRIM * max(rms, STEP_SIGMA))
-        if keep.sum() < MIN_PIXELS:
+        if keep.sum() < least:
             return Run(mu, mv, du, dv, 0.0), keep, rms
         mu, mv, du, dv, rms = axis_of(x, y, keep)
     along = (x[keep] - mu) * du + (y[keep] - mv) * dv
@@ -138,5 +153,5 @@ def pixel_variances(run: Run, rms: float, pixels: int, systematic: float, quantu
     """
     rows = 2.0 * run.half * min(abs(run.du), abs(run.dv))
     rounding = quantum / max(1.0, rows)
-    each = rounding * rounding + 3.0 * rms * rms / pixels  # neighbouring pixels err alike
+    each = rounding * rounding + 1.5 * rms * rms / pixels  # neighbouring pixels err somewhat alike
     return each + systematic * systematic, 3.0 * each / (run.half * run.half)

@@ -5,19 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from handey_studio.base import Value, frozen_array
-from handey_studio.localization.edges import JUMP, KIND_NAMES, EdgePixels
+from handey_studio.localization.edges import KIND_NAMES, EdgePixels
 from handey_studio.localization.flanks import Seen
-from handey_studio.localization.lines import Line, crease, silhouette
+from handey_studio.localization.lines import Line
+from handey_studio.localization.pieces import straight_lines
 from handey_studio.localization.runs import MIN_PIXELS
 from handey_studio.localization.surface import Surface, camera_of
 from handey_studio.sensing.depth_view import DepthView
 
 MAX_TURN = np.deg2rad(30.0)  # a pixel's own direction against the segment's: pixel directions are rough
 SETTLED = 12  # pixels after which the line alone decides: at corners the pixels' own directions mix
-MAX_BENDS = 4  # rounds of cutting a segment in two
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,51 +56,38 @@ class DataEdge(Value):
 
 @dataclass(frozen=True, eq=False)
 class Linked(Value):
-    """Edge pixels (n,) as `u`, `v` [px], their `kind`, their direction `theta` [rad] in the image, and `segment`, −1 for none."""
+    """Edge pixels (n,) as `u`, `v` [px], their `kind`, and `segment`, the number of their line among `lines`, −1 for none."""
 
     u: NDArray
     v: NDArray
     kind: NDArray
-    theta: NDArray
     segment: NDArray
+    lines: tuple[Line, ...]
 
 
 def link(view: DepthView, surface: Surface, edges: EdgePixels) -> Linked:
-    """Edge pixels linked to straight segments."""
+    """Edge pixels linked to straight segments, and the line in space of each."""
     v, u = np.nonzero(edges.kind)
     kind = edges.kind[v, u].astype(np.int64)
-    number = np.full(view.depth.shape, -1, dtype=np.int64)
+    number = np.full(view.depth.shape, -1, dtype=np.int32)
     number[v, u] = np.arange(len(u))
     across = max(1.0, 0.8 * view.outline_error / surface.pixel)  # px that a pixel may lie off its line
     ragged = across > 1.5
     gate = 6.0 * view.noise + 3.0 * surface.pixel
-    theta, quality = _directions(number, u, v, kind, view.depth, gate, 7 if ragged else 4)
+    depth = np.asarray(view.depth)
+    theta, quality = _directions(number, u, v, kind, depth, gate, 7 if ragged else 4)
     order = np.argsort(-quality, kind="stable")
-    segment = _grow(number, u, v, kind, view.depth, theta, order, (across, gate, MAX_TURN, 3.0 if ragged else 2.0))
-    return Linked(u, v, kind, theta, segment)
+    segment = _grow(number, u, v, kind, depth, theta, order, (across, gate, MAX_TURN, 3.0 if ragged else 2.0))
+    seen = Seen(depth, surface.slope, camera_of(view.projection), (view.noise, surface.typical), surface.radius_px, view.outline_error)
+    lines, segment = straight_lines(seen, edges.outward, kind, u, v, segment)
+    return Linked(u, v, kind, segment, lines)
 
 
 def data_edges(view: DepthView, surface: Surface, edges: EdgePixels, linked: Linked, min_length: float) -> tuple[DataEdge, ...]:
-    """Segments of at least `min_length` [m], fitted in space, longest first."""
-    seen = Seen(
-        np.array(view.depth),
-        np.array(surface.slope),
-        camera_of(view.projection),
-        (view.noise, surface.typical),
-        surface.radius_px,
-        view.outline_error,
-    )
-    order = np.argsort(linked.segment, kind="stable")
-    order = order[linked.segment[order] >= 0]
-    cuts = np.nonzero(np.diff(linked.segment[order]))[0] + 1
-    straight = [piece for members in np.split(order, cuts) if len(members) for piece in _unbent(view, surface, linked, members)]
-    found = []
-    for members in straight:
-        kind = int(linked.kind[members[0]])
-        u, v = linked.u[members].astype(float), linked.v[members].astype(float)
-        line = silhouette(seen, np.array(edges.outward), u, v) if kind == JUMP else crease(seen, u, v)
-        if line.pixels:
-            found.append(_data_edge(view, kind, line))
+    """Segments of at least `min_length` [m] in space, longest first."""
+    kinds = np.zeros(len(linked.lines), dtype=np.int64)
+    kinds[linked.segment[linked.segment >= 0]] = linked.kind[linked.segment >= 0]
+    found = [_data_edge(view, int(kind), line) for kind, line in zip(kinds, linked.lines, strict=True)]
     return tuple(sorted((edge for edge in found if edge.length >= min_length), key=lambda edge: -edge.length))
 
 
@@ -109,26 +95,6 @@ def _data_edge(view: DepthView, kind: int, line: Line) -> DataEdge:
     ends_world = line.ends @ view.T_world_sensor[:3, :3].T + view.T_world_sensor[:3, 3]
     normals, inward = line.normals[: line.flanks], line.inward[: line.flanks]
     return DataEdge(KIND_NAMES[kind], line.ends, ends_world, normals, inward, line.pixels, line.rms, line.offset_sigma, line.angle_sigma)
-
-
-def _unbent(view: DepthView, surface: Surface, linked: Linked, members: NDArray, depth: int = 0) -> list[NDArray]:
-    """A segment that is straight in the image, cut where it bends in depth: where two edges run on in one line."""
-    if len(members) < 2 * MIN_PIXELS or depth == MAX_BENDS:
-        return [members]
-    u, v = linked.u[members], linked.v[members]
-    spread = np.linalg.svd(np.c_[u - u.mean(), v - v.mean()], full_matrices=False)[2][0]
-    order = np.argsort(u * spread[0] + v * spread[1], kind="stable")
-    members = members[order]
-    along = (u * spread[0] + v * spread[1])[order]
-    heights = ndimage.median_filter(view.depth[v[order], u[order]], size=7, mode="nearest")
-    ends = max(3, len(members) // 8)
-    a, b = (np.array([along[part].mean(), heights[part].mean()]) for part in (slice(0, ends), slice(-ends, None)))
-    chord = a[1] + (along - a[0]) * (b[1] - a[1]) / max(b[0] - a[0], 1e-9)
-    off = np.abs(heights - chord)
-    cut = int(np.argmax(off))
-    if off[cut] < 4.0 * view.noise + 0.25 * view.outline_error or not MIN_PIXELS <= cut < len(members) - MIN_PIXELS:
-        return [members]
-    return [piece for half in (members[:cut], members[cut:]) for piece in _unbent(view, surface, linked, half, depth + 1)]
 
 
 @njit(cache=True)

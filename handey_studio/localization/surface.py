@@ -50,7 +50,7 @@ def surface_of(view: DepthView) -> Surface:
     pixel = float(1.0 / view.projection.pixels_per_metre(typical))
     radius = window_radius(view.noise, pixel)
     camera, noise = camera_of(view.projection), (view.noise, typical)
-    slope, normals = _slopes(np.asarray(view.depth), camera, noise, radius, 2 if radius >= 5 else 1)
+    slope, normals = _slopes(np.asarray(view.depth), camera, noise, radius, 2 if radius >= 4 else 1)
     for array in (slope, normals):
         array.flags.writeable = False  # shared from here on, not copied
     return Surface(normals, slope, radius, pixel, typical)
