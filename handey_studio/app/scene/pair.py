@@ -13,8 +13,8 @@ from handey_studio.localization.explain import Explanation
 ROOT = "/pair"
 DATA, MODEL = palette.BLUE, palette.SKY
 LIFT_M = np.array([0.0, 0.0, 0.0016])
-ARC_SHARE = 0.28  # of the shorter edge of the model, of which a data edge may be a small piece
-TEXT_SHARE = 0.27  # of the arc's radius
+ARC_SHARE = 0.13  # of the part's diameter, the radius at which α is drawn
+TEXT_SHARE = 0.034  # of it, the height of letters: they grow as one comes near, and keep apart
 
 
 class PairScene:
@@ -33,11 +33,12 @@ class PairScene:
         self._scene.add_frame(ROOT, show_axes=False)
         if said.model_pair is not None:
             self._lines("model_edges", said.model_pair.ends, MODEL, 6.0)
-        if said.data_pair is not None:
-            self._figure(said, said.data_pair)
+        part = new.session.part(new.hypothesis.part) if new.hypothesis else None
+        if said.data_pair is not None and part is not None:
+            self._figure(said, said.data_pair, part.solid.diameter)
 
-    def _figure(self, said: Explanation, pair: EdgePair) -> None:
-        radius = arc_radius(said.model_pair or pair)
+    def _figure(self, said: Explanation, pair: EdgePair, diameter: float) -> None:
+        radius = ARC_SHARE * diameter
         arc = pair.arc(radius)
         self._lines("data_edges", pair.ends, DATA, 9.0)
         self._lines("perpendicular", pair.feet[None], palette.INK, 3.0)
@@ -51,17 +52,12 @@ class PairScene:
                 texts[name],
                 position=scaled(place + 2 * LIFT_M),
                 font_size_mode="scene",
-                font_scene_height=float(scaled(TEXT_SHARE * radius)),
+                font_scene_height=float(scaled(TEXT_SHARE * diameter)),
                 anchor="center-center",
             )
 
     def _lines(self, name: str, ends: NDArray, colour: palette.RGB, thickness: float) -> None:
         self._scene.add_line_segments(f"{ROOT}/{name}", scaled(ends + LIFT_M), colors=colour, thickness=thickness, thickness_units="screen")
-
-
-def arc_radius(pair: EdgePair) -> float:
-    """Radius [m] at which α is drawn, by the shorter edge."""
-    return ARC_SHARE * float(np.linalg.norm(pair.ends[:, 1] - pair.ends[:, 0], axis=1).min())
 
 
 def parameter_texts(said: Explanation) -> dict[str, str]:

@@ -11,7 +11,7 @@ from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_scene_click
 from handey_studio.localization import DataEdge
 
-ROOT, EDGES, CHOSEN = "/sensed", "/sensed/edges", "/sensed/chosen_edge"
+EDGES, CHOSEN = "/sensed/edges", "/sensed/chosen_edge"
 LIFT_M = np.array([0.0, 0.0, 0.002])  # drawn just above the readings, not among them
 KIND_COLOURS = {"jump": palette.JUMP, "convex": palette.CONVEX, "concave": palette.CONCAVE}
 
