@@ -2,6 +2,7 @@
 
 import json
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -296,6 +297,16 @@ def test_a_peer_process_that_ends_is_told(toy, tmp_path):
     (tmp_path / "toy.py").write_text("import sys; sys.stdin.readline()")
     with pytest.raises(BadInput, match="ended at the request"):
         peers.PeerProcess(sys.executable)
+
+
+def test_a_worker_that_is_busy_is_not_waited_for(toy, tmp_path):
+    toy(True)
+    answer = json.dumps({"peers": ["sleeper"]})
+    (tmp_path / "toy.py").write_text(f"import sys, time\nsys.stdin.readline()\nprint('{answer}', flush=True)\ntime.sleep(600)")
+    process = peers.PeerProcess()
+    begun = time.monotonic()
+    process.close()
+    assert time.monotonic() - begun < 60
 
 
 def test_surface_points_cover_a_solid_evenly(library):

@@ -22,6 +22,7 @@ VOXELS_M = (0.003, 0.005)
 LEAST_FITNESS = 0.4  # of the model's points on the scene's: a sensor sees about half of a part
 SAMPLES = 20000  # points on a part's surface
 CLEARANCE_M = 0.004  # above the table, and at least three standard deviations: below is table
+PATIENCE_S = 2.0  # for a worker to end by itself
 WORKER = Path(__file__).with_name("peer_worker.py")
 HOW = (
     "pip install 'handey-studio[bench]' adds Open3D; OpenCV's point pairs need opencv-contrib-python-headless, in an environment of its own"
@@ -56,7 +57,11 @@ class PeerProcess:
         """End the worker and forget its files."""
         if self._process.stdin is not None:
             self._process.stdin.close()
-        self._process.wait()
+        try:
+            self._process.wait(timeout=PATIENCE_S)
+        except subprocess.TimeoutExpired:  # in the middle of a search that nobody waits for any more
+            self._process.kill()
+            self._process.wait()
         self._folder.cleanup()
 
     def ask(self, **request: Any) -> dict[str, Any]:
