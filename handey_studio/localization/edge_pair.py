@@ -54,7 +54,7 @@ class EdgePair(Value):
         base = self.feet.mean(axis=0)
         if self.parallel:
             return {"α": self.feet[0] + 2.2 * radius * self.directions[0], "d": base}
-        at = {"α": self.feet[0] + 1.9 * radius * bisector, "d": base if abs(self.d) > 1.5 * radius else base - 0.7 * radius * bisector}
+        at = {"α": self.feet[0] + 2.6 * radius * bisector, "d": base if abs(self.d) > 1.5 * radius else base - 0.7 * radius * bisector}
         for k, name in enumerate(("a1", "a2")):
             middle = (self.feet[k] + self.nearest[k]) / 2.0
             at[name] = middle if self.a[k] > 2.0 * radius else self.feet[k] + 2.2 * radius * self.directions[k]

@@ -26,7 +26,7 @@ from handey_studio.app.palette import residual_colours
 from handey_studio.app.panels.edges import about_edge, edge_labels, edges_legend, number_of
 from handey_studio.app.panels.explained import explained_html
 from handey_studio.app.panels.rows import hypothesis_rows, percent
-from handey_studio.app.scene.pair import parameters
+from handey_studio.app.scene.pair import parameter_texts, parameters
 from handey_studio.app.state import Explained, opened, with_view
 from handey_studio.base import Entry
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
@@ -235,6 +235,8 @@ def test_what_the_view_says_is_written_with_units_and_nothing_of_it_is_markup(fu
     assert "found" in text and "within the limit" in text and "+2.5 mm" in text
     names = [name for name, *_ in parameters(said)]
     assert names == ["α", "d", "a1", "a2"] and all(data in text and model in text for _, data, model in parameters(said))
+    texts = parameter_texts(said)
+    assert "(model 90.0°)" in texts["α"] and texts["d"].endswith(" mm") and texts["a2"].startswith("a2 ")
     bad = replace(state.session.scene.located.hypotheses[0], part=evil, reason=evil)
     scene = replace(state.session.scene, located=replace(state.session.scene.located, hypotheses=(bad,)))
     nasty = replace(state, session=replace(state.session, scene=scene))

@@ -14,7 +14,7 @@ ROOT = "/pair"
 DATA, MODEL = palette.BLUE, palette.SKY
 LIFT_M = np.array([0.0, 0.0, 0.0016])
 ARC_SHARE = 0.13  # of the part's diameter, the radius at which α is drawn
-TEXT_SHARE = 0.034  # of it, the height of letters: they grow as one comes near, and keep apart
+TEXT_SHARE = 0.028  # of it, the height of letters: they grow as one comes near, and keep apart
 
 
 class PairScene:
@@ -61,8 +61,9 @@ class PairScene:
 
 
 def parameter_texts(said: Explanation) -> dict[str, str]:
-    """What stands beside the strokes: each parameter of the data edges and, in brackets, of the model edges."""
-    return {name: f"{name} {data}" + (f" (model {model})" if model else "") for name, data, model in parameters(said)}
+    """What stands beside the strokes: each parameter of the data edges, of α in brackets that of the model edges, for which the others
+    lack the room; the panel has them all."""
+    return {name: f"{name} {data}" + (f" (model {model})" if model and name == "α" else "") for name, data, model in parameters(said)}
 
 
 def parameters(said: Explanation) -> list[tuple[str, str, str]]:
