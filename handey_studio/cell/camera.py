@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter, maximum_filter, minimum_filter
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.cell.bodies import SolidBody
@@ -49,7 +50,9 @@ class Seen(Value):
 class SensorFaults:
     """What real depth sensors add. `noise_m` is the standard deviation of a reading, `step_m` its rounding. Readings on faces seen at more
     than `grazing_deg` off their normal are lost with the chance `grazing_lost`. Pixels beside a jump of more than `jump_m` are lost with
-    the chance `jump_lost` or lie anywhere between the two surfaces with the chance `jump_mixed`."""
+    the chance `jump_lost` or lie anywhere between the two surfaces with the chance `jump_mixed`. Structured light does worse: the nearer
+    surface loses a ragged margin of about `ragged_px` at jumps, noise is shared between readings within `shared_px`, and the whole
+    field is warped by `warp_m` (standard deviation) over a tenth of the image."""
 
     noise_m: float = 0.0005
     step_m: float = 0.0001
@@ -58,6 +61,12 @@ class SensorFaults:
     jump_m: float = 0.005
     jump_lost: float = 0.15
     jump_mixed: float = 0.10
+    ragged_px: float = 0.0
+    shared_px: float = 0.0
+    warp_m: float = 0.0
+
+
+STRUCTURED_LIGHT = SensorFaults(ragged_px=2.2, shared_px=0.7, warp_m=0.0004)
 
 
 def look_exactly(camera: DepthCamera, bodies: Sequence[SolidBody]) -> Seen:
@@ -86,11 +95,39 @@ def with_faults(seen: Seen, faults: SensorFaults, rng: np.random.Generator) -> N
     chance, between = rng.random(depth.shape), rng.random(depth.shape)
     mixed = beside & (chance >= faults.jump_lost) & (chance < faults.jump_lost + faults.jump_mixed)
     depth[mixed] = (near + between * (far - near))[mixed]
-    depth += rng.normal(0.0, faults.noise_m, depth.shape)
+    depth += faults.noise_m * _field(depth.shape, faults.shared_px, rng)
+    if faults.warp_m > 0:
+        depth += faults.warp_m * _field(depth.shape, depth.shape[1] / 10, rng)
     grazing = seen.cosine < np.cos(np.deg2rad(faults.grazing_deg))
     lost = (beside & (chance < faults.jump_lost)) | (grazing & (rng.random(depth.shape) < faults.grazing_lost))
     depth[lost] = np.nan
+    if faults.ragged_px > 0:
+        depth[_ragged(seen, faults, rng)] = np.nan
     return np.round(depth / faults.step_m) * faults.step_m if faults.step_m > 0 else depth
+
+
+def _field(shape: tuple[int, ...], sigma_px: float, rng: np.random.Generator) -> NDArray:
+    """Random numbers (H, W) of mean 0 and standard deviation 1, shared between pixels within about `sigma_px`."""
+    if sigma_px <= 0:
+        return rng.normal(0.0, 1.0, shape)
+    coarse = max(1, int(sigma_px / 4))  # a wide field needs no number for each pixel
+    small = gaussian_filter(rng.normal(0.0, 1.0, [side // coarse + 2 for side in shape]), sigma_px / coarse)
+    field = cv2.resize(small, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR)
+    return field / field.std()
+
+
+def _ragged(seen: Seen, faults: SensorFaults, rng: np.random.Generator) -> NDArray:
+    """Pixels (H, W) of the nearer surface that are lost at its jumps, to a depth that changes along the outline."""
+    width = faults.ragged_px * np.clip(0.6 + 0.4 * _field(seen.depth.shape, 3.0, rng), 0.0, 2.0)
+    depth = np.nan_to_num(seen.depth, nan=np.inf)
+    with np.errstate(invalid="ignore"):
+        rim = beside_jumps(seen, faults.jump_m) & (maximum_filter(depth, size=3) - depth > faults.jump_m)
+    if not rim.any():
+        return rim
+    distance = np.asarray(distance_transform_edt(~rim))
+    near = minimum_filter(np.where(rim, depth, np.inf), size=2 * int(2.0 * faults.ragged_px) + 1)  # the rim's depth around each pixel
+    with np.errstate(invalid="ignore"):
+        return (distance < width) & (np.abs(depth - near) < 2.0 * faults.jump_m)
 
 
 def beside_jumps(seen: Seen, jump: float) -> NDArray:

@@ -6,9 +6,7 @@ from typing import NamedTuple
 from handey_studio.localization.candidates import Candidate, polished
 from handey_studio.localization.joint import explain_jointly
 from handey_studio.localization.result import Hypothesis, LocatedPose, pose_matrix
-from handey_studio.localization.samples import DENSER, part_samples
-from handey_studio.localization.score import Score, score
-from handey_studio.localization.search import Search, below_table
+from handey_studio.localization.search import Search
 
 MOST_RIVALS = 60  # candidates that are weighed against one another
 
@@ -25,31 +23,30 @@ class Fall(NamedTuple):
 def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPose], list[Hypothesis]]:
     """The poses that stand, most probable first, and every candidate with why it fell: the accepted first, then by probability."""
     start = time.perf_counter()
-    scores = [score(search, candidate) for candidate in candidates]
-    falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _objection(search, candidate, scores[n])) is not None}
-    chosen = _jointly(search, candidates, scores, falls)
-    accepted = [polished(search, candidates[n], part_samples(candidates[n].part, DENSER)) for n in chosen]
+    falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _objection(search, candidate)) is not None}
+    chosen = _jointly(search, candidates, falls)
+    accepted = [polished(search, candidates[n]) for n in chosen]
     for n, fall in sorted(falls.items()):
         search.ledger.fall(candidates[n].entry, fall.reason, value=fall.value, limit=fall.limit, unit=fall.unit)
-    rejected = sorted(falls, key=lambda n: -scores[n].probability)
+    rejected = sorted(falls, key=lambda n: -candidates[n].score.probability)
     poses = [_located(search, candidate) for candidate in accepted]
-    hypotheses = [_hypothesis(search, candidate, pose.score, None) for candidate, pose in zip(accepted, poses, strict=True)]
-    hypotheses += [_hypothesis(search, candidates[n], scores[n].probability, falls[n].reason) for n in rejected]
+    hypotheses = [_hypothesis(search, candidate, None) for candidate in accepted]
+    hypotheses += [_hypothesis(search, candidates[n], falls[n].reason) for n in rejected]
     search.timing["accept"] = time.perf_counter() - start
     return sorted(poses, key=lambda pose: -pose.score), hypotheses
 
 
-def _jointly(search: Search, candidates: list[Candidate], scores: list[Score], falls: dict[int, Fall]) -> list[int]:
+def _jointly(search: Search, candidates: list[Candidate], falls: dict[int, Fall]) -> list[int]:
     """Numbers of the candidates that stand together, most probable first; the others are added to `falls`."""
-    ranked = sorted((n for n in range(len(candidates)) if n not in falls), key=lambda n: -scores[n].probability)
+    ranked = sorted((n for n in range(len(candidates)) if n not in falls), key=lambda n: -candidates[n].score.probability)
     falls.update({n: Fall("too many better poses", k, MOST_RIVALS, "") for k, n in enumerate(ranked) if k >= MOST_RIVALS})
     standing = ranked[:MOST_RIVALS]
-    worth = [scores[n].probability * float(candidates[n].verdict.found[0]) for n in standing]
+    worth = [candidates[n].score.probability * float(candidates[n].verdict.found[0]) for n in standing]
     joint = explain_jointly(search, [candidates[n] for n in standing], worth)
     falls.update({standing[k]: Fall(*rivalry) for k, rivalry in joint.fell.items()})
     chosen = []
     count: dict[str, int] = {}
-    for n in sorted((standing[k] for k in joint.chosen), key=lambda n: -scores[n].probability):
+    for n in sorted((standing[k] for k in joint.chosen), key=lambda n: -candidates[n].score.probability):
         name = candidates[n].part.name
         count[name] = count.get(name, 0) + 1
         if count[name] > search.options.max_poses:
@@ -59,17 +56,16 @@ def _jointly(search: Search, candidates: list[Candidate], scores: list[Score], f
     return chosen
 
 
-def _objection(search: Search, candidate: Candidate, rated: Score) -> Fall | None:
+def _objection(search: Search, candidate: Candidate) -> Fall | None:
     """The first thing that speaks against a candidate by itself."""
     options, verdict = search.options, candidate.verdict
-    depth = below_table(search, candidate.part, candidate.R, candidate.t)
     allowed = 6.0 * search.view.noise + 0.5 * search.view.outline_error
-    if depth > allowed:
-        return Fall("it would stand below the table", depth, allowed, "m")
+    if candidate.below > allowed:
+        return Fall("it would stand below the table", candidate.below, allowed, "m")
     if verdict.visible_fraction[0] < options.min_visible_fraction:
         return Fall("too little of it is seen", float(verdict.visible_fraction[0]), options.min_visible_fraction, "")
-    if rated.probability < options.min_score:
-        return Fall(rated.doubt, rated.probability, options.min_score, "")
+    if candidate.score.probability < options.min_score:
+        return Fall(candidate.score.doubt, candidate.score.probability, options.min_score, "")
     return None
 
 
@@ -79,7 +75,7 @@ def _located(search: Search, candidate: Candidate) -> LocatedPose:
         candidate.part.name,
         search.view.T_world_sensor @ T,
         T,
-        score(search, candidate).probability,
+        candidate.score.probability,
         int(verdict.predicted[0]),
         int(verdict.edges[0]),
         float(verdict.visible_fraction[0]),
@@ -89,9 +85,17 @@ def _located(search: Search, candidate: Candidate) -> LocatedPose:
     )
 
 
-def _hypothesis(search: Search, candidate: Candidate, probability: float, reason: str | None) -> Hypothesis:
+def _hypothesis(search: Search, candidate: Candidate, reason: str | None) -> Hypothesis:
     T_world_part = search.view.T_world_sensor @ pose_matrix(candidate.R, candidate.t)
     found, missing = float(candidate.verdict.found[0]), float(candidate.verdict.missing[0])
     return Hypothesis(
-        candidate.part.name, T_world_part, probability, found, missing, candidate.data, reason, candidate.model, candidate.entry
+        candidate.part.name,
+        T_world_part,
+        candidate.score.probability,
+        found,
+        missing,
+        candidate.data,
+        reason,
+        candidate.model,
+        candidate.entry,
     )

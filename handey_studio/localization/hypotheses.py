@@ -10,6 +10,8 @@ from handey_studio.localization.edges import CONVEX
 from handey_studio.localization.pairs import DataLines, ModelEdges, Pairs, ParallelPairs
 from handey_studio.sensing.depth_view import DepthView
 
+MIN_LENGTH_SHARE = 0.45  # of its model edge that a single data edge must show
+
 
 class MatchTolerances(NamedTuple):
     """How far data may lie from the model: `angle` [rad] of α, `offset` [m] of d, `reach` [m] that a data edge may stick out of its
@@ -34,7 +36,7 @@ class Assignments(NamedTuple):
 
     def rows(self, chosen: NDArray) -> "Assignments":
         """Some of the transforms, by their numbers."""
-        return Assignments(*(array[chosen] for array in self[:4]), self.tried, self.fell)
+        return self._replace(R=self.R[chosen], t=self.t[chosen], data=self.data[chosen], model=self.model[chosen])
 
 
 FELL = (
@@ -66,10 +68,17 @@ def hypothesize_parallel(
     return Assignments(R, t, numbers[:, :2], numbers[:, 2:], int(tried), fell)
 
 
-def joined(one: Assignments, other: Assignments) -> Assignments:
-    """All of both."""
-    R, t, data, model = (np.concatenate([a, b]) for a, b in zip(one[:4], other[:4], strict=True))
-    return Assignments(R, t, data, model, one.tried + other.tried, one.fell + other.fell)
+def hypothesize_single(edges: ModelEdges, lines: DataLines, limits: MatchTolerances, most: int) -> Assignments:
+    """The same for single edges that are seen for a good part of their length: the surface beside such an edge is the second line that the
+    paper asks for, and an end of it is laid on the end of its model edge. Half-hidden parts often show no two edges."""
+    R, t, numbers, tried, fell = _match_single(edges, lines, limits, most)
+    return Assignments(R, t, numbers[:, :2], numbers[:, 2:], int(tried), fell)
+
+
+def joined(*several: Assignments) -> Assignments:
+    """All of them."""
+    R, t, data, model = (np.concatenate([getattr(one, key) for one in several]) for key in ("R", "t", "data", "model"))
+    return Assignments(R, t, data, model, sum(one.tried for one in several), np.sum([one.fell for one in several], axis=0))
 
 
 @njit(cache=True)
@@ -235,4 +244,43 @@ def _match_parallel(edges, table, lines, pairs, limits, most):
                         t_out[n, r] = (lines.middle[i, r] + lines.middle[j, r]) / 2 - model
                     numbers[n, 0], numbers[n, 1], numbers[n, 2], numbers[n, 3] = i, j, a, b
                     n += 1
+    return R_out[:n], t_out[:n], numbers[:n], tried, fell
+
+
+@njit(cache=True)
+def _match_single(edges, lines, limits, most):
+    R_out, t_out = np.empty((most, 3, 3)), np.empty((most, 3))
+    numbers, fell = np.empty((most, 4), dtype=np.int64), np.zeros(4, dtype=np.int64)
+    frame_model, frame_data = np.empty((3, 3)), np.empty((3, 3))
+    n = tried = 0
+    for i in range(len(lines.half)):
+        if lines.side[i, 0] == 0.0:
+            continue
+        for a in range(len(edges.half)):
+            tried += 1
+            spare = edges.half[a] - lines.half[i]
+            if spare < -limits.reach / 2 or lines.half[i] < MIN_LENGTH_SHARE * edges.half[a]:
+                fell[2] += 1
+                continue
+            for sign in (-1.0, 1.0):
+                normal = edges.left[a] if lines.side[i, 0] * sign > 0 else edges.right[a]
+                _axes(edges.direction[a], normal, frame_model)
+                _axes(sign * lines.direction[i], lines.flank[i, 0], frame_data)
+                R = frame_data @ frame_model.T
+                if not _flanks_agree(R, edges, a, lines, i, sign, limits.flank):
+                    fell[3] += 1
+                    continue
+                for end in (-1.0, 1.0):
+                    if n == most:
+                        return R_out, t_out, numbers, tried, fell
+                    for r in range(3):
+                        model = 0.0
+                        for c in range(3):
+                            model += R[r, c] * (edges.middle[a, c] + end * spare * edges.direction[a, c])
+                            R_out[n, r, c] = R[r, c]
+                        t_out[n, r] = lines.middle[i, r] - model
+                    numbers[n, 0], numbers[n, 1], numbers[n, 2], numbers[n, 3] = i, i, a, a
+                    n += 1
+                    if spare < limits.reach / 2:
+                        break
     return R_out[:n], t_out[:n], numbers[:n], tried, fell

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.localization.candidates import Candidate
-from handey_studio.localization.search import Search, below_table
+from handey_studio.localization.search import Search
+from handey_studio.localization.verify import Verdict
+from handey_studio.world.part import Part
 
 INTERCEPT = 2.41
 WEIGHTS = {
@@ -19,6 +20,7 @@ WEIGHTS = {
     "creases that should be seen are missing": -8.96,  # metres a metre of visible edge
     "the sensor sees through it": -34.0,  # root of the share of the surface
     "its edges lie beside those that are seen": -9.4,  # scatter, in raggednesses of the view's outlines
+    "one of its faces lies beside the readings": -3.1,  # in standard errors of the view
     "the readings lie off its faces": -2.43,  # rms, in sigmas of a reading
     "its outline is larger than what is seen": -4.0,  # margin, in spreads of what sensors lose at silhouettes
     "too few of its edges are found": 3.12,  # logarithm of their number
@@ -26,32 +28,52 @@ WEIGHTS = {
     "what is found leaves it loose": -0.73,  # logarithm of the loosest point's sigma, in tolerances
     "there are no readings where it should be": -2.3,  # share of the surface
     "it would stand below the table": -0.99,  # sigmas of a reading
+    "it does not rest on the table": 0.0,  # 1 if three corners do
 }
-TYPICAL = np.array([0.0, 0.0, 0.05, 0.0, 0.4, 0.8, 0.2, 1.6, -1.0, -1.3, 0.0, 0.0])  # of right poses
+FREE_THROUGH = 0.01  # of the surface may be seen through by chance
+TYPICAL = np.array([0.0, 0.0, 0.05, 0.0, 0.4, 0.1, 0.8, 0.2, 1.6, -1.0, -1.3, 0.0, 0.0, 1.0])  # of right poses
 
 
-def features(search: Search, candidate: Candidate) -> NDArray:
-    """(12,) the numbers that the score weighs, in the order of `WEIGHTS`."""
-    v, view, diameter = candidate.verdict, search.view, candidate.part.solid.diameter
-    visible = max(float(v.found[0] + v.missing[0]), 1e-9)
-    outline, crease = float(v.missing[0] - v.unbent[0]), float(v.unbent[0])
-    seen = max(float(v.on[0] + v.through[0] + v.unknown[0]), 1e-12)
-    ragged = view.noise + 0.5 * view.outline_error
-    return np.array(
+class Rated(NamedTuple):
+    """Poses (n,) of one part as the score looks at them: their `verdict`, the `margin` [m] and `rms` [m] of their refinement, the
+    `sigma` [m] of their loosest points, how far [m] they reach `below` the table, and whether three corners `rest` on it."""
+
+    verdict: Verdict
+    margin: NDArray
+    rms: NDArray
+    sigma: NDArray
+    below: NDArray
+    rest: NDArray
+
+    def rows(self, chosen: NDArray) -> "Rated":
+        """Some of the poses, by their numbers."""
+        return Rated(self.verdict.rows(chosen), *(array[chosen] for array in self[1:]))
+
+
+def features(search: Search, part: Part, rated: Rated) -> NDArray:
+    """(n, k) the numbers that the score weighs, in the order of `WEIGHTS`."""
+    v, view, diameter = rated.verdict, search.view, part.solid.diameter
+    visible = np.maximum(v.found + v.missing, 1e-9)
+    outline = v.missing - v.unbent
+    seen = np.maximum(v.on + v.through + v.unknown, 1e-12)
+    return np.stack(
         [
             outline / visible,
             outline / diameter,
-            crease / visible,
-            np.sqrt(v.through[0] / seen),
-            min(v.scatter[0] / ragged, 5.0),
-            min(candidate.rms / view.noise, 6.0),
-            min(abs(candidate.margin - search.weights.margin) / search.weights.margin_spread, 6.0),
-            np.log(max(v.edges[0], 0.5)),
-            np.log(max(v.on[0], 1e-9) / diameter**2),
-            np.log(max(candidate.sigma / (view.noise + view.outline_error), 0.01)),
-            v.unknown[0] / seen,
-            np.clip((below_table(search, candidate.part, candidate.R, candidate.t) - 2.0 * view.noise) / view.noise, 0.0, 8.0),
-        ]
+            v.unbent / visible,
+            np.sqrt(np.maximum(v.through / seen - FREE_THROUGH, 0.0)),
+            np.minimum(v.scatter / (view.noise + 0.5 * view.outline_error), 5.0),
+            np.minimum(v.lifted / (view.noise + 0.1 * view.outline_error), 5.0),
+            np.minimum(rated.rms / view.noise, 6.0),
+            np.minimum(np.abs(rated.margin - search.weights.margin) / search.weights.margin_spread, 6.0),
+            np.log(np.maximum(v.edges, 0.5)),
+            np.log(np.maximum(v.on, 1e-9) / diameter**2),
+            np.log(np.maximum(rated.sigma / (view.noise + view.outline_error), 0.01)),
+            v.unknown / seen,
+            np.clip(rated.below / view.noise - 2.0, 0.0, 8.0),
+            rated.rest,
+        ],
+        axis=1,
     )
 
 
@@ -62,8 +84,9 @@ class Score(NamedTuple):
     doubt: str
 
 
-def score(search: Search, candidate: Candidate) -> Score:
-    """How probable a candidate is."""
-    weights, found = np.array(list(WEIGHTS.values())), features(search, candidate)
-    doubt = list(WEIGHTS)[int(np.argmin(weights * (found - TYPICAL)))]
-    return Score(float(1.0 / (1.0 + np.exp(-(INTERCEPT + weights @ found)))), doubt)
+def scores(search: Search, part: Part, rated: Rated) -> list[Score]:
+    """How probable each pose is."""
+    weights, found = np.array(list(WEIGHTS.values())), features(search, part, rated)
+    doubts = np.argmin(weights * (found - TYPICAL), axis=1)
+    probability = 1.0 / (1.0 + np.exp(-(INTERCEPT + found @ weights)))
+    return [Score(float(p), list(WEIGHTS)[doubt]) for p, doubt in zip(probability, doubts, strict=True)]

@@ -12,7 +12,7 @@ from handey_studio.localization.edges import edge_pixels
 from handey_studio.localization.evidence import Evidence, Limits, evidence_of, limits_of
 from handey_studio.localization.hypotheses import MatchTolerances, tolerances
 from handey_studio.localization.refine import Weights, weights_of
-from handey_studio.localization.result import LocateOptions, pose_matrix
+from handey_studio.localization.result import LocateOptions
 from handey_studio.localization.segments import DataEdge, data_edges, link
 from handey_studio.localization.surface import surface_of
 from handey_studio.sensing.depth_view import DepthView
@@ -21,6 +21,7 @@ from handey_studio.world.part import Part
 ROUGH = 1.8  # tolerances of poses straight from two edges, against those of refined ones
 MIN_EDGE_PX = 8.0
 STAGES = ("edges", "evidence", "hypothesize", "verify", "refine", "accept")
+RESTING_SIGMAS = 2.0  # a corner so near to the table rests on it
 TABLE_SHARE = 0.02  # of the readings that must lie at the table's height before the table is believed in
 
 
@@ -62,11 +63,15 @@ def look(view: DepthView, options: LocateOptions) -> Search:
     return Search(view, evidence, edges, options, limits, rough, weights, tolerances(view), table, ledger, Counter(), timing)
 
 
-def below_table(search: Search, part: Part, R: NDArray, t: NDArray) -> float:
-    """How far [m] a part at a pose (sensor's frame) reaches below the table, zero where no table is seen."""
+def on_table(search: Search, part: Part, R: NDArray, t: NDArray) -> tuple[NDArray, NDArray]:
+    """How far [m] poses R (n, 3, 3), t (n, 3) of a part in the sensor's frame reach below the table, and whether three corners rest on
+    it (n,); zeros where no table is seen."""
     if not search.table or search.options.table_z_m is None:
-        return 0.0
-    return max(0.0, search.options.table_z_m - part.lowest(search.view.T_world_sensor @ pose_matrix(R, t)))
+        return np.zeros(len(t)), np.zeros(len(t))
+    up, height = search.view.T_world_sensor[2, :3], search.view.T_world_sensor[2, 3] - search.options.table_z_m
+    z = part.solid.vertices @ np.einsum("nij,i->nj", R, up).T + t @ up + height
+    tolerance = RESTING_SIGMAS * search.view.noise + 0.25 * search.view.outline_error
+    return np.maximum(-z.min(axis=0), 0.0), ((np.abs(z) < tolerance).sum(axis=0) >= 3).astype(float)
 
 
 def _sees_table(view: DepthView, options: LocateOptions) -> bool:

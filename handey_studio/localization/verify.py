@@ -16,7 +16,7 @@ from handey_studio.localization.samples import PartSamples
 
 ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
 GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on
-CLEAR_PX = 2.5  # from the part's own edges before an edge of the view is none of them
+MIN_OF_ONE = 4  # samples of an edge or face before their mean counts
 STEEP = 0.4  # cosine; a face seen more squarely than this should give readings
 UNREAD_COST = 0.3  # of a reading that sees through: no reading where there should be one
 ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but raggedly
@@ -28,11 +28,14 @@ MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the 
 
 
 class Verdict(NamedTuple):
-    """What speaks for and against poses (n,): `found` and `missing` [m] of visible edge, `unbent` of it missing between two faces that are
-    both seen, where creases are harder to find than outlines; of the faces that look at the sensor [m²]
-    those `on` readings, seen `through`, `hidden` behind nearer readings, and `unknown` where nothing was read; the number of
-    edges `predicted` to be seen and of those found, `edges`; and how far found edge pixels `scatter` [m] about a common margin; and where
-    the view has a straight edge and the part none, `stray` [m²] of its faces."""
+    """What speaks for and against poses (n,).
+
+    `found` and `missing` [m] of visible edge; of the faces that look at the sensor [m²] those `on` readings, seen `through`,
+    `hidden` behind nearer readings, and `unknown` where nothing was read; the number of edges `predicted` to be seen and of those
+    found, `edges`; how far found edge pixels `scatter` [m] about a common margin; `unbent` [m] of the missing edges between two faces
+    that are both seen, as creases are harder to find than outlines; by how much [m] the edge that lies worst is `shifted`, and the face
+    that lies worst `lifted`, against what is seen.
+    """
 
     found: NDArray
     missing: NDArray
@@ -43,8 +46,9 @@ class Verdict(NamedTuple):
     predicted: NDArray
     edges: NDArray
     scatter: NDArray
-    stray: NDArray
     unbent: NDArray
+    shifted: NDArray
+    lifted: NDArray
 
     def rows(self, chosen: NDArray) -> "Verdict":
         """Those of some of the poses, by their numbers."""
@@ -75,7 +79,7 @@ class Verdict(NamedTuple):
 def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, every: int = 1) -> Verdict:
     """Verdicts on the poses R (n, 3, 3), t (n, 3) of the part in the sensor's frame, from every `every`-th sample."""
     counts = _verify(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits, every)
-    lengths_and_areas = (0, 1, 2, 3, 4, 5, 9, 10)
+    lengths_and_areas = (0, 1, 2, 3, 4, 5, 9)
     counts[:, lengths_and_areas] *= every
     return Verdict(*counts.T)
 
@@ -177,61 +181,61 @@ def inwards(R, t, k, edge, samples, evidence):
 
 @njit(cache=True)
 def _edges(R, t, samples, evidence, limits, offset, every, out):
-    """Adds metres found and missing, and the edges predicted and found, of one pose."""
-    visible = found = samples_of_edge = matched = 0
-    total = squares = 0.0
+    """Adds what one pose's edges say: `found` to `edges`, `scatter`, `unbent` and `shifted` of its verdict."""
+    visible = found = samples_of_edge = 0
+    offs, matched = np.zeros(samples.edge[-1] + 1), np.zeros(samples.edge[-1] + 1)
+    squares = 0.0
     for k in range(offset, len(samples.edge), every):
         state, edge = edge_state(R, t, k, samples, evidence, limits)
         if edge >= 0:
             off = inwards(R, t, k, edge, samples, evidence)
-            total, squares, matched = total + off, squares + off * off, matched + 1
+            offs[samples.edge[k]], matched[samples.edge[k]] = offs[samples.edge[k]] + off, matched[samples.edge[k]] + 1.0
+            squares += off * off
         weight = samples.edge_weight[k]
         if state == 2:
             out[0] += ENDS_WORTH * weight
         elif state >= 0:
             out[1 - state] += weight
             if state == 0 and crease_in_sight(R, t, k, samples, evidence):
-                out[10] += weight
+                out[9] += weight
         visible, found, samples_of_edge = visible + (state >= 0), found + (state >= 1), samples_of_edge + 1
         if k + every >= len(samples.edge) or samples.edge[k + every] != samples.edge[k]:
             if visible >= 2 and visible >= MIN_VISIBLE_SHARE * samples_of_edge:
                 out[6] += 1.0
                 out[7] += found >= MIN_EDGE_SHARE * visible
             visible = found = samples_of_edge = 0
-    if matched > 0:
-        out[8] = np.sqrt(max(squares / matched - (total / matched) ** 2, 0.0))
-
-
-@njit(cache=True)
-def _on_edge(x, y, z, evidence):
-    """Whether a straight edge of the view passes within a pixel of a point."""
-    u, v = project(x, y, z, evidence.camera)
-    i, j = int(np.rint(u)), int(np.rint(v))
-    for sector in range(len(evidence.nearest)):
-        k = evidence.nearest[sector, j, i]
-        if k >= 0 and abs(evidence.edge_uv[k, 0] - u) <= 1.0 and abs(evidence.edge_uv[k, 1] - v) <= 1.0:
-            return True
-    return False
+    if matched.sum() > 0:
+        mean = offs.sum() / matched.sum()
+        out[8] = np.sqrt(max(squares / matched.sum() - mean * mean, 0.0))
+        for e in range(len(offs)):
+            if matched[e] >= MIN_OF_ONE:
+                out[10] = max(out[10], abs(offs[e] / matched[e] - mean))
 
 
 @njit(cache=True)
 def _surfaces(R, t, samples, evidence, limits, offset, every, out):
-    """Adds the square metres on readings, seen through, hidden and without a reading, of one pose."""
+    """Adds what one pose's faces say: the square metres on readings, seen through, hidden and without a reading, and `lifted`."""
+    total, count = 0.0, 0
     for k in range(offset, len(samples.face_weight), every):
-        p = samples.face_point[k]
+        p, normal = samples.face_point[k], samples.face_normal[k]
+        last = k - every
+        if last >= 0 and (samples.face_normal[last] != normal).any():
+            out[11] = max(out[11], abs(total) / count if count >= MIN_OF_ONE else 0.0)
+            total, count = 0.0, 0
         x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
-        cosine = facing(R, samples.face_normal[k], x, y, z, evidence.camera)
+        cosine = facing(R, normal, x, y, z, evidence.camera)
         if cosine < GRAZING:
             continue
-        seen, _ = reading_at(x, y, z, evidence, limits)
+        seen, behind = reading_at(x, y, z, evidence, limits)
         rim = samples.face_rim[k] * cosine < limits.edge + 0.5 * evidence.pixel
         if rim and seen in (THROUGH, UNKNOWN):
             continue  # the margin that sensors lose at silhouettes
         if seen == UNKNOWN and cosine < STEEP:
             seen = HIDDEN  # too steep to blame the part for the missing reading
-        if seen == ON and samples.face_rim[k] * cosine > limits.edge + CLEAR_PX * evidence.pixel and _on_edge(x, y, z, evidence):
-            out[9] += samples.face_weight[k]
+        if seen == ON:
+            total, count = total + behind * cosine / ray_at(x, y, z, evidence.camera)[2], count + 1
         out[2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += samples.face_weight[k]
+    out[11] = max(out[11], abs(total) / count if count >= MIN_OF_ONE else 0.0)
 
 
 @njit(cache=True)
@@ -254,7 +258,7 @@ def _unopposed(R, t, samples, evidence, limits):
 
 @njit(cache=True)
 def _verify(R, t, samples, evidence, limits, every):
-    out = np.zeros((len(t), 11))
+    out = np.zeros((len(t), 12))
     for n in range(len(t)):
         _edges(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
         _surfaces(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
