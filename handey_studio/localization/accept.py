@@ -24,8 +24,14 @@ def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPos
     """The poses that stand, most probable first, and every candidate with why it fell: the accepted first, then by probability."""
     start = time.perf_counter()
     falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _objection(search, candidate)) is not None}
-    chosen = _jointly(search, candidates, falls)
-    accepted = [polished(search, candidates[n]) for n in chosen]
+    accepted = []
+    for n in _jointly(search, candidates, falls):
+        candidate = polished(search, candidates[n])
+        fall = _objection(search, candidate)
+        if fall is None:
+            accepted.append(candidate)
+        else:
+            falls[n] = fall
     for n, fall in sorted(falls.items()):
         search.ledger.fall(candidates[n].entry, fall.reason, value=fall.value, limit=fall.limit, unit=fall.unit)
     rejected = sorted(falls, key=lambda n: -candidates[n].score.probability)
@@ -59,7 +65,7 @@ def _jointly(search: Search, candidates: list[Candidate], falls: dict[int, Fall]
 def _objection(search: Search, candidate: Candidate) -> Fall | None:
     """The first thing that speaks against a candidate by itself."""
     options, verdict = search.options, candidate.verdict
-    allowed = 6.0 * search.view.noise + 0.5 * search.view.outline_error
+    allowed = 4.0 * search.slack
     if candidate.below > allowed:
         return Fall("it would stand below the table", candidate.below, allowed, "m")
     if verdict.visible_fraction[0] < options.min_visible_fraction:

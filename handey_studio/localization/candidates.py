@@ -17,11 +17,12 @@ from handey_studio.localization.search import Search, on_table
 from handey_studio.localization.verify import Verdict, unopposed, verify
 from handey_studio.world.part import Part
 
+FAR_BELOW = 6.0  # slacks below the table, beyond which a rough pose is not worth refining
 SAME_SHARE = 0.04  # of a part's diameter: hypotheses nearer than this are one
-EVERY = 4  # samples that the first verification looks at: one in so many
+EVERY = 6  # samples that the first verification looks at: one in so many
 FIRST_STEPS, LAST_STEPS = 4, 8  # of refinement, with few samples over rough limits, and with all over tight ones
 MOST_A_PLACE = 20  # hypotheses refined of those whose middles lie together
-MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE = 60, 4
+MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE = 40, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +61,9 @@ def candidates_of(search: Search, part: Part) -> list[Candidate]:
     if not len(found.t):
         return []
     start = time.perf_counter()
-    possible = unopposed(found.R, found.t, part_samples(part), search.evidence, search.rough)
-    search.fell["the sensor sees through it"] += len(found.t) - len(possible)
-    found = found.rows(possible)
+    found = _possible(search, part, found)
+    if not len(found.t):
+        return []
     verdict = verify(found.R, found.t, part_samples(part), search.evidence, search.rough, EVERY)
     order = np.argsort(-verdict.support, kind="stable")
     kept = distinct(found.R, found.t, order, part, _apart(search, part), search.options.max_refined, MOST_A_PLACE)
@@ -73,6 +74,16 @@ def candidates_of(search: Search, part: Part) -> list[Candidate]:
     made = _candidates(search, part, refined, rated, found.data[kept], found.model[kept])
     entries = [search.ledger.add("verify", f"{part.name} from edges {c.data[0]} and {c.data[1]}", parent=parent) for c in made]
     return [replace(candidate, entry=entry) for candidate, entry in zip(made, entries, strict=True)]
+
+
+def _possible(search: Search, part: Part, found: Assignments) -> Assignments:
+    """Those that a glance does not rule out."""
+    above = np.nonzero(on_table(search, part, found.R, found.t)[0] <= FAR_BELOW * search.slack)[0]
+    search.fell["it would stand below the table"] += len(found.t) - len(above)
+    found = found.rows(above)
+    possible = unopposed(found.R, found.t, part_samples(part), search.evidence, search.rough)
+    search.fell["the sensor sees through it"] += len(found.t) - len(possible)
+    return found.rows(possible)
 
 
 def polished(search: Search, candidate: Candidate) -> Candidate:
@@ -121,11 +132,11 @@ def _refined(search: Search, part: Part, R: NDArray, t: NDArray, numbers: NDArra
 
 
 def _rated(search: Search, part: Part, refined: Refined, verdict: Verdict) -> Rated:
-    sigma = _loosest(part, refined.R, refined.covariance)
-    return Rated(verdict, refined.margin, refined.rms, sigma, *on_table(search, part, refined.R, refined.t))
+    return Rated(verdict, refined.margin, refined.rms, *on_table(search, part, refined.R, refined.t))
 
 
 def _candidates(search: Search, part: Part, refined: Refined, rated: Rated, data: NDArray, model: NDArray) -> list[Candidate]:
+    sigma = _loosest(part, refined.R, refined.covariance)
     return [
         Candidate(
             part,
@@ -133,7 +144,7 @@ def _candidates(search: Search, part: Part, refined: Refined, rated: Rated, data
             refined.t[k],
             float(refined.margin[k]),
             float(refined.rms[k]),
-            float(rated.sigma[k]),
+            float(sigma[k]),
             float(rated.below[k]),
             rated.verdict.rows(np.array([k])),
             score,

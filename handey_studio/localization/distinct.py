@@ -32,26 +32,45 @@ def probe_points(part: Part) -> NDArray:
 
 
 @njit(cache=True)
+def _moved(R, t, points, out):
+    """Points (4, 3) at a pose, into `out`."""
+    for p in range(len(points)):
+        for r in range(3):
+            out[p, r] = R[r, 0] * points[p, 0] + R[r, 1] * points[p, 1] + R[r, 2] * points[p, 2] + t[r]
+
+
+@njit(cache=True)
+def _nearer(one, other, limit):
+    """Whether all four points lie nearer than `limit` to their counterparts; told at the first that does not."""
+    for p in range(len(one)):
+        x, y, z = one[p, 0] - other[p, 0], one[p, 1] - other[p, 1], one[p, 2] - other[p, 2]
+        if x * x + y * y + z * z >= limit * limit:
+            return False
+    return True
+
+
+@njit(cache=True)
 def _distinct(R, t, order, probes, apart, most, place, most_a_place):
     kept = np.empty(most, dtype=np.int64)
     images = np.empty((most, 4, 3))
+    image = np.empty((4, 3))
     n = 0
     for number in order:
-        middle = probes[0, 0] @ R[number].T + t[number]
+        _moved(R[number], t[number], probes[0], image)
         here = 0
         for k in range(n):
-            here += np.sqrt(((images[k, 0] - middle) ** 2).sum()) < place
+            here += _nearer(images[k, :1], image[:1], place)
         new = here < most_a_place
-        for s in range(len(probes) if new else 0):
-            image = probes[s] @ R[number].T + t[number]
+        for s in range(len(probes) if new and here > 0 else 0):
+            _moved(R[number], t[number], probes[s], image)
             for k in range(n):
-                if np.sqrt(((images[k] - image) ** 2).sum(axis=1).max()) < apart:
+                if _nearer(images[k], image, apart):
                     new = False
                     break
             if not new:
                 break
         if new:
-            images[n] = probes[0] @ R[number].T + t[number]
+            _moved(R[number], t[number], probes[0], images[n])
             kept[n] = number
             n += 1
             if n == most:

@@ -10,7 +10,7 @@ from handey_studio.localization.edges import CONVEX
 from handey_studio.localization.pairs import DataLines, ModelEdges, Pairs, ParallelPairs
 from handey_studio.sensing.depth_view import DepthView
 
-MIN_LENGTH_SHARE = 0.45  # of its model edge that a single data edge must show
+MIN_LENGTH_SHARE = 0.5  # of its model edge that a single data edge must show
 
 
 class MatchTolerances(NamedTuple):

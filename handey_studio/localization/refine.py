@@ -19,6 +19,7 @@ from handey_studio.sensing.depth_view import DepthView
 
 TAPERING = 0.5  # limits shrink to this share over the iterations
 MAX_TURN = 0.2  # rad in one step
+STILL_RAD, STILL = 5e-4, 0.05  # a step that turns and shifts (in sigmas of a reading) by less is the last
 
 
 class Refined(NamedTuple):
@@ -172,11 +173,13 @@ def _refine(R, t, samples, evidence, limits, weights, iterations):
             if count < 6:
                 break
             rms[n] = np.sqrt(squares / count)
-            if step == iterations - 1:
-                covariance[n] = np.linalg.inv(A)[:6, :6]
-                break
             delta = np.linalg.solve(A, g)
             turn = np.sqrt(delta[0] ** 2 + delta[1] ** 2 + delta[2] ** 2)
+            shift = np.sqrt(delta[3] ** 2 + delta[4] ** 2 + delta[5] ** 2)
+            still = step >= iterations // 2 and turn < STILL_RAD and shift < STILL * weights.face
+            if step == iterations - 1 or still:
+                covariance[n] = np.linalg.inv(A)[:6, :6]
+                break
             if turn > MAX_TURN:
                 delta *= MAX_TURN / turn
             R[n] = _turned(R[n], delta[:3])

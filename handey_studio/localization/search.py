@@ -21,7 +21,6 @@ from handey_studio.world.part import Part
 ROUGH = 1.8  # tolerances of poses straight from two edges, against those of refined ones
 MIN_EDGE_PX = 8.0
 STAGES = ("edges", "evidence", "hypothesize", "verify", "refine", "accept")
-RESTING_SIGMAS = 2.0  # a corner so near to the table rests on it
 TABLE_SHARE = 0.02  # of the readings that must lie at the table's height before the table is believed in
 
 
@@ -41,6 +40,11 @@ class Search:
     ledger: Ledger
     fell: Counter[str]
     timing: dict[str, float]
+
+    @property
+    def slack(self) -> float:
+        """How far [m] an outline or a corner may be off: what noise and lost margins leave uncertain."""
+        return self.view.noise + 0.5 * self.view.outline_error
 
 
 def look(view: DepthView, options: LocateOptions) -> Search:
@@ -64,14 +68,13 @@ def look(view: DepthView, options: LocateOptions) -> Search:
 
 
 def on_table(search: Search, part: Part, R: NDArray, t: NDArray) -> tuple[NDArray, NDArray]:
-    """How far [m] poses R (n, 3, 3), t (n, 3) of a part in the sensor's frame reach below the table, and whether three corners rest on
-    it (n,); zeros where no table is seen."""
+    """How far [m] poses R (n, 3, 3), t (n, 3) of a part in the sensor's frame reach below the table, and how far [m] the third lowest
+    corner is off it (n,): three corners on the table are a part at rest. Zeros and infinity where no table is seen."""
     if not search.table or search.options.table_z_m is None:
-        return np.zeros(len(t)), np.zeros(len(t))
+        return np.zeros(len(t)), np.full(len(t), np.inf)
     up, height = search.view.T_world_sensor[2, :3], search.view.T_world_sensor[2, 3] - search.options.table_z_m
     z = part.solid.vertices @ np.einsum("nij,i->nj", R, up).T + t @ up + height
-    tolerance = RESTING_SIGMAS * search.view.noise + 0.25 * search.view.outline_error
-    return np.maximum(-z.min(axis=0), 0.0), ((np.abs(z) < tolerance).sum(axis=0) >= 3).astype(float)
+    return np.maximum(-z.min(axis=0), 0.0), np.sort(np.abs(z), axis=0)[2]
 
 
 def _sees_table(view: DepthView, options: LocateOptions) -> bool:
