@@ -36,6 +36,7 @@ FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and fro
 AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.845  # edges times surfaces that agree: how fast odds grow, and where they are even
 EDGES_WORTH, EVEN_EDGES = 2.0, 6.0  # more edges that are found say more
 OFF_COST, SUNK_COST = 4.0, 1.5  # a sigma that the readings' rms is too large; a slack too far below the table
+REST_UNKNOWN = 0.8
 TYPICAL = np.array([0.0, 0.0, 0.05, 0.0, 0.4, 0.1, 0.8, 0.2, 1.6, -1.0, 0.0, 0.0, 1.0, 1.0])  # of right poses
 
 
@@ -75,11 +76,16 @@ def features(search: Search, part: Part, rated: Rated) -> NDArray:
             np.log(np.maximum(v.on, 1e-9) / diameter**2),
             v.unknown / seen,
             np.clip(rated.below / view.noise - 2.0, 0.0, 3.0),
-            1.0 * (rated.rest < 2.0 * view.noise + 0.25 * view.outline_error),
-            1.0 * (rated.rest < 2.0 * search.slack),
+            _rests(rated, 2.0 * view.noise + 0.25 * view.outline_error),
+            _rests(rated, 2.0 * search.slack),
         ],
         axis=1,
     )
+
+
+def _rests(rated: Rated, tolerance: float) -> NDArray:
+    """1 where three corners lie within `tolerance` [m] of the table; where there is no table, what most right poses would have."""
+    return np.where(np.isinf(rated.rest), REST_UNKNOWN, rated.rest < tolerance)
 
 
 class Score(NamedTuple):
