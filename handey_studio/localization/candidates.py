@@ -29,8 +29,8 @@ MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE = 40, 4
 class Candidate(Value):
     """A refined pose `R` (3, 3), `t` (3,) [m] of a part in the sensor's frame and its `verdict` (of one pose).
 
-    From data edges `data` assigned to model edges `model`; `margin` [m] lost at silhouettes, `rms` [m] of readings off faces,
-    `sigma` [m] how far its loosest point could be off, given what was found; `below` [m] the table; the `score`.
+    From the one or two data edges `data` assigned to model edges `model`; `margin` [m] lost at silhouettes, `rms` [m] of readings
+    off faces, `sigma` [m] how far its loosest point could be off, given what was found; `below` [m] the table; the `score`.
     """
 
     part: Part
@@ -72,8 +72,12 @@ def candidates_of(search: Search, part: Part) -> list[Candidate]:
     refined, rated, kept = _refined(search, part, found.R[kept], found.t[kept], kept)
     search.timing["refine"] += time.perf_counter() - start
     made = _candidates(search, part, refined, rated, found.data[kept], found.model[kept])
-    entries = [search.ledger.add("verify", f"{part.name} from edges {c.data[0]} and {c.data[1]}", parent=parent) for c in made]
+    entries = [search.ledger.add("verify", f"{part.name} from {_origin(c.data)}", parent=parent) for c in made]
     return [replace(candidate, entry=entry) for candidate, entry in zip(made, entries, strict=True)]
+
+
+def _origin(data: tuple[int, ...]) -> str:
+    return f"edges {data[0]} and {data[1]}" if len(data) == 2 else f"edge {data[0]} and the surface beside it"
 
 
 def _possible(search: Search, part: Part, found: Assignments) -> Assignments:
@@ -148,8 +152,8 @@ def _candidates(search: Search, part: Part, refined: Refined, rated: Rated, data
             float(rated.below[k]),
             rated.verdict.rows(np.array([k])),
             score,
-            tuple(int(i) for i in data[k]),
-            tuple(int(i) for i in model[k]),
+            tuple(dict.fromkeys(int(i) for i in data[k])),
+            tuple(dict.fromkeys(int(i) for i in model[k])),
         )
         for k, score in enumerate(scores(search, part, rated))
     ]

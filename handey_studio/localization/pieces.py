@@ -1,4 +1,4 @@
-"""Straight pieces of linked edge pixels, each fitted as one line in space; collinear ones joined over dropouts."""
+"""Straight pieces of linked edge pixels, each fitted as one line in space."""
 
 import numpy as np
 from numba import njit

@@ -51,7 +51,7 @@ class LocatedPose(Value):
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis(Value):
-    """A pose that was weighed: from data edges `data` assigned to model edges `model` (their numbers), its `score`, and what was
+    """A pose that was weighed: from one or two data edges `data` assigned to model edges `model` (their numbers), its `score`, and what was
     found and what was missing [m of edge]; `reason` says why it fell, None if it was accepted, and the ledger's entry number `entry`
     by how much (-1: none)."""
 
