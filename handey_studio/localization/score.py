@@ -33,7 +33,7 @@ WEIGHTS = {
     "no three corners are near the table": 0.617,  # 1 if they are, to within what outlines leave uncertain
 }
 FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and from which agreement decides
-AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.845  # edges times surfaces that agree: how fast odds grow, and where they are even
+AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.873  # edges times surfaces that agree: how fast odds grow, and where they are even
 EDGES_WORTH, EVEN_EDGES = 4.0, 6.0  # more edges that are found say more
 OFF_COST, SUNK_COST = 4.0, 1.5  # a sigma that the readings' rms is too large; a slack too far below the table
 REST_UNKNOWN = 0.8
