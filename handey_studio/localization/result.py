@@ -28,7 +28,8 @@ class LocateOptions:
 
 @dataclass(frozen=True, eq=False)
 class LocatedPose(Value):
-    """A part found. Transforms (4, 4); `score` in [0, 1] is the probability that it is right;
+    """A part found. Transforms (4, 4); `score` in [0, 1] is the probability that it is right
+    (before coarse sensors a rule on agreement, see `score`);
     `visible_fraction` of the faces turned to the sensor is seen; `surface_rms_m` [m] how far
     readings lie off them; `margin_m` [m] what the sensor lost at silhouettes, `sigma_m` [m] the standard deviation of its
     loosest point."""

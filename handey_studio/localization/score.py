@@ -21,14 +21,14 @@ WEIGHTS = {
     "more outline is missing than is chance": -3.8,  # metres a diameter of the part
     "creases that should be seen are missing": -7.96,  # metres a metre of visible edge
     "the sensor sees through it": -45.6,  # root of the share of the surface
-    "its edges lie beside those that are seen": -9.96,  # scatter, in raggednesses of the view's outlines
-    "one of its faces lies beside the readings": -1.51,  # in standard errors of the view
+    "its edges lie beside those that are seen": -9.96,  # scatter, in slacks of the search
+    "one of its faces lies beside the readings": -1.51,  # mean, in what noise and outlines leave uncertain
     "the readings lie off its faces": -4.6,  # rms, in sigmas of a reading
     "its outline is larger than what is seen": -1.88,  # margin, in spreads of what sensors lose at silhouettes
     "too few of its edges are found": 3.83,  # logarithm of their number
     "too little of its surface is seen": 1.25,  # logarithm of square diameters
     "there are no readings where it should be": -5.59,  # share of the surface
-    "it would stand below the table": -2.33,  # in slacks
+    "it would stand below the table": -2.33,  # sigmas of a reading beyond two
     "it does not rest on the table": 2.98,  # 1 if three corners do, to within noise
     "no three corners are near the table": 0.617,  # 1 if they are, to within what outlines leave uncertain
 }
@@ -36,7 +36,7 @@ FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and fro
 AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.873  # edges times surfaces that agree: how fast odds grow, and where they are even
 EDGES_WORTH, EVEN_EDGES = 4.0, 6.0  # more edges that are found say more
 OFF_COST, SUNK_COST = 4.0, 1.5  # a sigma that the readings' rms is too large; a slack too far below the table
-REST_UNKNOWN = 0.8
+REST_UNKNOWN = 0.8  # where no table is seen: about the share of right poses that rest
 TYPICAL = np.array([0.0, 0.0, 0.05, 0.0, 0.4, 0.1, 0.8, 0.2, 1.6, -1.0, 0.0, 0.0, 1.0, 1.0])  # of right poses
 
 

@@ -16,7 +16,7 @@ from handey_studio.localization.samples import PartSamples
 
 ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
 GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on
-MIN_OF_ONE = 4  # samples of an edge or face before their mean counts
+MIN_OF_ONE = 4  # samples of a face before their mean counts
 STEEP = 0.4  # cosine; a face seen more squarely than this should give readings
 UNREAD_COST = 0.3  # of a reading that sees through: no reading where there should be one
 ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but raggedly
@@ -33,8 +33,8 @@ class Verdict(NamedTuple):
     `found` and `missing` [m] of visible edge; of the faces that look at the sensor [m²] those `on` readings, seen `through`,
     `hidden` behind nearer readings, and `unknown` where nothing was read; the number of edges `predicted` to be seen and of those
     found, `edges`; how far found edge pixels `scatter` [m] about a common margin; `unbent` [m] of the missing edges between two faces
-    that are both seen, as creases are harder to find than outlines; by how much [m] the edge that lies worst is `shifted`, and the face
-    that lies worst `lifted`, against what is seen.
+    that are both seen, as creases are harder to find than outlines; and by how much [m] the face
+    that lies worst is `lifted` against what is seen.
     """
 
     found: NDArray
@@ -47,7 +47,6 @@ class Verdict(NamedTuple):
     edges: NDArray
     scatter: NDArray
     unbent: NDArray
-    shifted: NDArray
     lifted: NDArray
 
     def rows(self, chosen: NDArray) -> "Verdict":
@@ -181,16 +180,14 @@ def inwards(R, t, k, edge, samples, evidence):
 
 @njit(cache=True)
 def _edges(R, t, samples, evidence, limits, offset, every, out):
-    """Adds what one pose's edges say: `found` to `edges`, `scatter`, `unbent` and `shifted` of its verdict."""
-    visible = found = samples_of_edge = 0
-    offs, matched = np.zeros(samples.edge[-1] + 1), np.zeros(samples.edge[-1] + 1)
-    squares = 0.0
+    """Adds what one pose's edges say: `found` to `edges`, `scatter` and `unbent` of its verdict."""
+    visible = found = samples_of_edge = matched = 0
+    total = squares = 0.0
     for k in range(offset, len(samples.edge), every):
         state, edge = edge_state(R, t, k, samples, evidence, limits)
         if edge >= 0:
             off = inwards(R, t, k, edge, samples, evidence)
-            offs[samples.edge[k]], matched[samples.edge[k]] = offs[samples.edge[k]] + off, matched[samples.edge[k]] + 1.0
-            squares += off * off
+            total, squares, matched = total + off, squares + off * off, matched + 1
         weight = samples.edge_weight[k]
         if state == 2:
             out[0] += ENDS_WORTH * weight
@@ -204,12 +201,8 @@ def _edges(R, t, samples, evidence, limits, offset, every, out):
                 out[6] += 1.0
                 out[7] += found >= MIN_EDGE_SHARE * visible
             visible = found = samples_of_edge = 0
-    if matched.sum() > 0:
-        mean = offs.sum() / matched.sum()
-        out[8] = np.sqrt(max(squares / matched.sum() - mean * mean, 0.0))
-        for e in range(len(offs)):
-            if matched[e] >= MIN_OF_ONE:
-                out[10] = max(out[10], abs(offs[e] / matched[e] - mean))
+    if matched > 0:
+        out[8] = np.sqrt(max(squares / matched - (total / matched) ** 2, 0.0))
 
 
 @njit(cache=True)
@@ -220,7 +213,7 @@ def _surfaces(R, t, samples, evidence, limits, offset, every, out):
         p, normal = samples.face_point[k], samples.face_normal[k]
         last = k - every
         if last >= 0 and (samples.face_normal[last] != normal).any():
-            out[11] = max(out[11], abs(total) / count if count >= MIN_OF_ONE else 0.0)
+            out[10] = max(out[10], abs(total) / count if count >= MIN_OF_ONE else 0.0)
             total, count = 0.0, 0
         x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
         cosine = facing(R, normal, x, y, z, evidence.camera)
@@ -235,7 +228,7 @@ def _surfaces(R, t, samples, evidence, limits, offset, every, out):
         if seen == ON:
             total, count = total + behind * cosine / ray_at(x, y, z, evidence.camera)[2], count + 1
         out[2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += samples.face_weight[k]
-    out[11] = max(out[11], abs(total) / count if count >= MIN_OF_ONE else 0.0)
+    out[10] = max(out[10], abs(total) / count if count >= MIN_OF_ONE else 0.0)
 
 
 @njit(cache=True)
@@ -258,7 +251,7 @@ def _unopposed(R, t, samples, evidence, limits):
 
 @njit(cache=True)
 def _verify(R, t, samples, evidence, limits, every):
-    out = np.zeros((len(t), 12))
+    out = np.zeros((len(t), 11))
     for n in range(len(t)):
         _edges(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
         _surfaces(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
