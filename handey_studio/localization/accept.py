@@ -71,7 +71,7 @@ def _objection(search: Search, candidate: Candidate) -> Fall | None:
     if verdict.visible_fraction[0] < options.min_visible_fraction:
         return Fall("too little of it is seen", float(verdict.visible_fraction[0]), options.min_visible_fraction, "")
     if candidate.score.probability < options.min_score:
-        return Fall(candidate.score.doubt, candidate.score.probability, options.min_score, "")
+        return Fall(f"improbable, above all as {candidate.score.doubt}", candidate.score.probability, options.min_score, "")
     return None
 
 
