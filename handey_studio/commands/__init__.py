@@ -1,0 +1,10 @@
+"""The shell's commands, one file each: its name, its one line of help, its arguments, and what it runs.
+
+A command imports the rooms that it needs when it runs: together they take seconds to load.
+"""
+
+from handey_studio.commands import bench_locate, bench_piles, locate, move, plan, scan, scan_calibrate, scan_simulate, studio
+
+COMMANDS = (studio, locate, scan, scan_calibrate, scan_simulate, move, plan, bench_piles, bench_locate)
+
+__all__ = ["COMMANDS"]
