@@ -1,12 +1,16 @@
 """The score: how probable it is that a pose is right, from what the view shows of it.
 
-A logistic regression over ratios that mean the same for every part. Its weights were fitted to the candidates, right and wrong, of
-simulated piles seen by a fine sensor (0.5 mm of noise), whose truth is known. Where a sensor's noise hides the small differences between
-look-alikes, and models are no truer than it (cartons before a Kinect), such weights ask for too much: there the score goes by how far
-edges and surfaces agree, as many cells hold few parts of one size. Between the two it changes over gradually.
+A logistic regression over ratios that mean the same for every part. Its weights stand in `score.toml`; `handey fit score` fits them
+to the candidates, right and wrong, of simulated piles seen by a fine sensor (0.5 mm of noise), whose truth is known. Where a sensor's
+noise hides the small differences between look-alikes, and models are no truer than it (cartons before a Kinect), such weights ask for
+too much: there the score goes by how far edges and surfaces agree, as many cells hold few parts of one size. Between the two it changes
+over gradually.
 """
 
-from typing import NamedTuple
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,29 +19,45 @@ from handey_studio.localization.search import Search
 from handey_studio.localization.verify import Verdict
 from handey_studio.world.part import Part
 
-INTERCEPT = 3.6
-WEIGHTS = {
-    "outlines that should be seen are missing": -23.7,  # metres of silhouette a metre of visible edge
-    "more outline is missing than is chance": -3.8,  # metres a diameter of the part
-    "creases that should be seen are missing": -7.96,  # metres a metre of visible edge
-    "the sensor sees through it": -45.6,  # root of the share of the surface
-    "its edges lie beside those that are seen": -9.96,  # scatter, in slacks of the search
-    "one of its faces lies beside the readings": -1.51,  # mean, in what noise and outlines leave uncertain
-    "the readings lie off its faces": -4.6,  # rms, in sigmas of a reading
-    "its outline is larger than what is seen": -1.88,  # margin, in spreads of what sensors lose at silhouettes
-    "too few of its edges are found": 3.83,  # logarithm of their number
-    "too little of its surface is seen": 1.25,  # logarithm of square diameters
-    "there are no readings where it should be": -5.59,  # share of the surface
-    "it would stand below the table": -2.33,  # sigmas of a reading beyond two
-    "it does not rest on the table": 2.98,  # 1 if three corners do, to within noise
-    "no three corners are near the table": 0.617,  # 1 if they are, to within what outlines leave uncertain
-}
+FEATURES = (
+    "outlines that should be seen are missing",  # metres of silhouette a metre of visible edge
+    "more outline is missing than is chance",  # metres a diameter of the part
+    "creases that should be seen are missing",  # metres a metre of visible edge
+    "the sensor sees through it",  # root of the share of the surface
+    "its edges lie beside those that are seen",  # scatter, in slacks of the search
+    "one of its faces lies beside the readings",  # mean, in what noise and outlines leave uncertain
+    "the readings lie off its faces",  # rms, in sigmas of a reading
+    "its outline is larger than what is seen",  # margin, in spreads of what sensors lose at silhouettes
+    "too few of its edges are found",  # logarithm of their number
+    "too little of its surface is seen",  # logarithm of square diameters
+    "there are no readings where it should be",  # share of the surface
+    "it would stand below the table",  # sigmas of a reading beyond two
+    "it does not rest on the table",  # 1 if three corners do, to within noise
+    "no three corners are near the table",  # 1 if they are, to within what outlines leave uncertain
+)
 FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and from which agreement decides
 AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.873  # edges times surfaces that agree: how fast odds grow, and where they are even
 EDGES_WORTH, EVEN_EDGES = 4.0, 6.0  # more edges that are found say more
 OFF_COST, SUNK_COST = 4.0, 1.5  # a sigma that the readings' rms is too large; a slack too far below the table
 REST_UNKNOWN = 0.8  # where no table is seen: about the share of right poses that rest
-TYPICAL = np.array([0.0, 0.0, 0.05, 0.0, 0.4, 0.1, 0.8, 0.2, 1.6, -1.0, 0.0, 0.0, 1.0, 1.0])  # of right poses
+
+
+class ScoreWeights(NamedTuple):
+    """What the score makes of its features (k,): the logarithm of the odds is `intercept` + features · `worth`. `typical` features of
+    right poses tell what is unusual about a pose."""
+
+    intercept: float
+    worth: NDArray
+    typical: NDArray
+
+
+def weights_from(table: Mapping[str, Any]) -> ScoreWeights:
+    """Weights from a table like `score.toml`'s. A feature that it does not name has not been fitted yet and weighs nothing."""
+    worth, typical = (np.array([float(table[kind].get(name, 0.0)) for name in FEATURES]) for kind in ("weights", "typical"))
+    return ScoreWeights(float(table["intercept"]), worth, typical)
+
+
+FITTED = weights_from(tomllib.loads(Path(__file__).with_name("score.toml").read_text()))
 
 
 class Rated(NamedTuple):
@@ -57,7 +77,7 @@ class Rated(NamedTuple):
 
 
 def features(search: Search, part: Part, rated: Rated) -> NDArray:
-    """(n, k) the numbers that the score weighs, in the order of `WEIGHTS`."""
+    """(n, k) the numbers that the score weighs, in the order of `FEATURES`."""
     v, view, diameter = rated.verdict, search.view, part.solid.diameter
     visible = np.maximum(v.found + v.missing, 1e-9)
     outline = v.missing - v.unbent
@@ -89,20 +109,21 @@ def _rests(rated: Rated, tolerance: float) -> NDArray:
 
 
 class Score(NamedTuple):
-    """`probability` in [0, 1] that a pose is right, and the `doubt`: what speaks most against it."""
+    """`probability` in [0, 1] that a pose is right, the `doubt`: what speaks most against it, and the `features` (k,) that tell so."""
 
     probability: float
     doubt: str
+    features: NDArray
 
 
 def scores(search: Search, part: Part, rated: Rated) -> list[Score]:
     """How probable each pose is."""
-    weights, found = np.array(list(WEIGHTS.values())), features(search, part, rated)
-    doubts = np.argmin(weights * (found - TYPICAL), axis=1)
+    found = features(search, part, rated)
+    doubts = np.argmin(FITTED.worth * (found - FITTED.typical), axis=1)
     coarse = np.clip((search.view.noise - FINE_M) / (COARSE_M - FINE_M), 0.0, 1.0)
-    odds = (1.0 - coarse) * (INTERCEPT + found @ weights) + coarse * _coarse_odds(search, rated)
+    odds = (1.0 - coarse) * (FITTED.intercept + found @ FITTED.worth) + coarse * _coarse_odds(search, rated)
     probability = 1.0 / (1.0 + np.exp(-odds))
-    return [Score(float(p), list(WEIGHTS)[doubt]) for p, doubt in zip(probability, doubts, strict=True)]
+    return [Score(float(p), FEATURES[doubt], row) for p, doubt, row in zip(probability, doubts, found, strict=True)]
 
 
 def _coarse_odds(search: Search, rated: Rated) -> NDArray:
