@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from handey_studio.world import World
 from handey_studio.world.collision import collision_model
-from handey_studio.world.collision_bodies import OUTSIDE, TABLE, Obstacles
+from handey_studio.world.collision_bodies import Obstacles
 from handey_studio.world.gjk import distance
 
 CLIP_M = 0.25  # farther than this nothing is told apart: more than a cell of the configuration space moves anything
@@ -35,8 +35,7 @@ def distance_field(world: World) -> Field:
     """The field of a world's blocks, parts and depth map, kept warm in this process."""
     model = collision_model(world)
     solids, terrain = model.solids, model.terrain
-    flat = [model.names.index(name) for name in (TABLE, OUTSIDE)]
-    solid = np.flatnonzero(~np.isin(solids.name, flat))
+    solid = np.arange(model.slabs, len(solids.name))
     spans = [_spans(solids)[solid], _spans(terrain)]
     boxes = np.concatenate(spans)
     boxes[:, 0] = np.maximum(boxes[:, 0], [*world.free_space[0, :2], max(world.table_z, world.free_space[0, 2])])

@@ -5,12 +5,15 @@ from handey_studio.world.library import Library
 from handey_studio.world.model_files import read_part, write_obj
 from handey_studio.world.part import Held, Mate, Part, PlacedPart
 from handey_studio.world.robot import FINGERS, Hand, Robot, load_robot
-from handey_studio.world.world import Block, World
+from handey_studio.world.world import EVERYWHERE, NO_TABLE, Block, ConvexBody, World
 
 __all__ = [
+    "EVERYWHERE",
     "FINGERS",
+    "NO_TABLE",
     "Arm",
     "Block",
+    "ConvexBody",
     "Hand",
     "Held",
     "Library",

@@ -16,6 +16,9 @@ class Tree(NamedTuple):
     right: NDArray
 
 
+NOWHERE = Tree(*np.empty((2, 0, 3)), *np.empty((2, 0), np.int64))  # the tree of no boxes
+
+
 def build_tree(low: NDArray, high: NDArray) -> Tree:
     """The tree of k ≥ 1 boxes (k, 3) [m]: complete, over the boxes in Morton order of their centres, so that neighbours share nodes.
 

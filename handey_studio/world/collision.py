@@ -24,6 +24,7 @@ from handey_studio.world.collision_bodies import (
     obstacles_of,
     pack,
     robot_pieces,
+    slabs_of,
     solids_of,
     terrain_obstacles,
 )
@@ -115,6 +116,8 @@ class CollisionModel:
         self._T_hand_last = inverse(self.arm.T_last_hand)
         self._pieces = robot_pieces(world.robot)
         solids = solids_of(world)
+        self.slabs = len(slabs_of(world))
+        """How many of the solids, the first ones, are the table and the space outside."""
         self.names = tuple(dict.fromkeys([DEPTH_MAP, "", *(name for name, _ in solids), *(piece.name for piece in self._pieces)]))
         self._numbers = {name: k for k, name in enumerate(self.names)}
         self.solids = obstacles_of(solids, self._numbers)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from handey_studio.geometry import HeightField
 from handey_studio.geometry.transforms import apply
 from handey_studio.world.arm import arm_of, hand_hulls
-from handey_studio.world.bounding_tree import Tree, build_tree
+from handey_studio.world.bounding_tree import NOWHERE, Tree, build_tree
 from handey_studio.world.part import Held
 from handey_studio.world.robot import Robot
 from handey_studio.world.world import World
@@ -17,6 +17,7 @@ from handey_studio.world.world import World
 COLUMN_M = 0.001  # columns finer than this are made coarser, the highest wins: coarse ones would reach into what stands beside them
 TABLE_SKIN_M = 0.0015  # readings up to this far above the table are the table's own, seen through the sensor's noise
 SOLID_M = 2.0  # thickness of the table and of the space outside: more than any arm reaches through
+EDGE_M = 50.0  # the table's and the outside's edges: beyond what any arm reaches
 DEPTH_MAP, TABLE, OUTSIDE = "depth map", "table", "outside"
 
 
@@ -99,17 +100,25 @@ def pack(pieces: list[Piece], numbers: dict[str, int], touching: frozenset[froze
     )
 
 
+def slabs_of(world: World) -> list[tuple[str, NDArray]]:
+    """Name and corners (8, 3) [m] in the world of the space outside and the table, as far as there are any."""
+    slabs = [(OUTSIDE, corners) for corners in _outside(world.free_space)]
+    if np.isfinite(world.table_z):
+        lower, upper = np.clip(world.free_space[0] - SOLID_M, -EDGE_M, EDGE_M), np.clip(world.free_space[1] + SOLID_M, -EDGE_M, EDGE_M)
+        slabs.append((TABLE, _corners((*lower[:2], world.table_z - SOLID_M), (*upper[:2], world.table_z))))
+    return slabs
+
+
 def solids_of(world: World) -> list[tuple[str, NDArray]]:
-    """Name and corners (k, 3) [m] in the world of the table, the space outside, the blocks and the parts' convex pieces."""
-    solids = [(OUTSIDE, corners) for corners in _outside(world.free_space)]
-    lower, upper = world.free_space[0] - SOLID_M, world.free_space[1] + SOLID_M
-    solids.append((TABLE, _corners((*lower[:2], world.table_z - SOLID_M), (*upper[:2], world.table_z))))
-    solids += [(block.name, block.corners_world) for block in world.blocks]
+    """Name and corners (k, 3) [m] in the world of the slabs first, then the blocks and the parts' convex pieces."""
+    solids = slabs_of(world) + [(block.name, block.corners_world) for block in world.blocks]
     return solids + [(placed.name, apply(placed.T_world_part, piece)) for placed in world.parts for piece in placed.part.pieces]
 
 
 def obstacles_of(solids: list[tuple[str, NDArray]], numbers: dict[str, int]) -> Obstacles:
     """Arrays of fixed bodies."""
+    if not solids:
+        return Obstacles(np.empty((0, 3)), np.zeros(1, np.int64), np.empty(0, np.int64), NOWHERE)
     low = np.array([corners.min(axis=0) for _, corners in solids])
     high = np.array([corners.max(axis=0) for _, corners in solids])
     return Obstacles(
@@ -139,7 +148,7 @@ def terrain_obstacles(terrain: HeightField | None, table_z: float, ceiling: floa
     """The depth map's columns, kept from world to world; the number of their name is 0."""
     columns = columns_of(terrain, table_z, ceiling)
     k = len(columns)
-    tree = build_tree(columns.min(axis=1), columns.max(axis=1)) if k else Tree(*np.empty((2, 0, 3)), *np.empty((2, 0), np.int64))
+    tree = build_tree(columns.min(axis=1), columns.max(axis=1)) if k else NOWHERE
     return Obstacles(columns.reshape(-1, 3), np.arange(k + 1) * 8, np.zeros(k, np.int64), tree)
 
 
@@ -149,11 +158,13 @@ def _corners(lower: tuple[float, ...] | NDArray, upper: tuple[float, ...] | NDAr
 
 
 def _outside(free: NDArray) -> list[NDArray]:
-    """The six slabs around the free space."""
+    """The slabs around the free space, up to six: none where it has no end."""
     slabs = []
     for axis in range(3):
         for side in (0, 1):
-            lower, upper = free[0] - SOLID_M, free[1] + SOLID_M
+            if not np.isfinite(free[side, axis]):
+                continue
+            lower, upper = np.clip(free[0] - SOLID_M, -EDGE_M, EDGE_M), np.clip(free[1] + SOLID_M, -EDGE_M, EDGE_M)
             if side:
                 lower[axis] = free[1, axis]
             else:

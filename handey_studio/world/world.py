@@ -30,7 +30,20 @@ class Block(Value):
         return half @ self.T_world_block[:3, :3].T + self.T_world_block[:3, 3]
 
 
+@dataclass(frozen=True, eq=False)
+class ConvexBody(Value):
+    """A known fixed convex body of the workcell: the hull of its corners (k, 3) [m] in the world."""
+
+    name: str
+    corners_world: NDArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "corners_world", frozen_array(self.corners_world))
+
+
 DEFAULT_FREE_SPACE = frozen_array([[-1.2, -1.2, -0.2], [1.2, 1.2, 1.6]])
+EVERYWHERE = frozen_array([[-np.inf] * 3, [np.inf] * 3])
+NO_TABLE = -np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,17 +51,22 @@ class World(Value):
     """The robot, the table (solid below `table_z`), known blocks, located parts, and the depth map as solid columns.
 
     `free_space` (2, 3) [m] are the lower and upper corner of the space that the workcell declares free wherever nothing
-    was scanned; everything outside it is solid, and called `outside`.
+    was scanned; everything outside it is solid, and called `outside`. A workcell that declares all space free says `EVERYWHERE`, and
+    `table_z` is `NO_TABLE` where there is none; a depth map needs a table and a bounded space.
     Bodies are called `table`, `depth map`, the names of blocks and part instances, the links' names and
     `finger_left`, `finger_right`, `crosspiece`, `mount`.
     """
 
     robot: Robot
     table_z: float = 0.0
-    blocks: tuple[Block, ...] = ()
+    blocks: tuple[Block | ConvexBody, ...] = ()
     parts: tuple[PlacedPart, ...] = ()
     terrain: HeightField | None = None
     free_space: NDArray = field(default_factory=lambda: DEFAULT_FREE_SPACE)
+
+    def __post_init__(self) -> None:
+        if self.terrain is not None and not (np.isfinite(self.table_z) and np.isfinite(self.free_space).all()):
+            raise ValueError("a depth map needs a table below it and a bounded free space around it.")
 
     def part(self, name: str) -> PlacedPart:
         """The located instance of that name."""
