@@ -18,6 +18,12 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
         "--scenes", type=Path, help="folder of scenes, simulated or labelled real ones; with --seeds, where simulated ones are kept"
     )
     bench.add_argument("--sensor", choices=("camera", "range_finder"), default="camera", help="what sees new scenes (default: camera)")
+    bench.add_argument(
+        "--ask",
+        choices=("together", "each"),
+        default="together",
+        help="one call for all parts of a scene, or one for each (default: together)",
+    )
     bench.add_argument("--peers", action="store_true", help="ask Open3D and OpenCV the same questions, as far as they are installed")
     bench.add_argument("--peer-python", metavar="PYTHON", help="interpreter of the environment that holds the peers (default: this one)")
     bench.add_argument("--peer-poses", type=positive, default=1, help="poses that each peer may report for a part (default: 1, its best)")
@@ -36,6 +42,7 @@ def run(given: argparse.Namespace) -> int:
         seeds=given.seeds,
         scenes=given.scenes,
         sensor=given.sensor,
+        ask=given.ask,
         peers=given.peers,
         peer_python=given.peer_python,
         peer_poses=given.peer_poses,

@@ -19,8 +19,9 @@ from handey_studio.cell.workcell import Workcell
 from handey_studio.cli import main
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy, inverse, rotation_about, transform
+from handey_studio.localization import Hypothesis, LocatedPose, LocateResult
 from handey_studio.sensing.depth_view import DepthView, Pinhole
-from handey_studio.task.bench_locate import bench_locate, command, peers, plot, run_bench
+from handey_studio.task.bench_locate import answers, bench_locate, command, peers, plot, run_bench
 from handey_studio.task.bench_locate.answers import Answer, Pose
 from handey_studio.task.bench_locate.label_judge import LabelJudge, Labelled
 from handey_studio.task.bench_locate.labelled_scenes import LabelledScene, load_labelled, scene_folders
@@ -156,8 +157,8 @@ class Told:
     def see(self, scene):
         self.scene = scene.name
 
-    def locate(self, part):
-        return Answer(tuple(Pose(T, 1.0) for T in self.answers.get((self.scene, part.name), ())), 0.25)
+    def locate(self, parts):
+        return tuple(Answer(tuple(Pose(T, 1.0) for T in self.answers.get((self.scene, part.name), ())), 0.25) for part in parts)
 
 
 def test_real_scenes_are_read_and_judged(real_folder, library):
@@ -211,6 +212,27 @@ def test_parts_of_simulated_scenes_are_found_from_their_files(library, tmp_path)
     assert poses[0] == poses[1]
 
 
+@pytest.mark.parametrize(("ask", "calls"), [("together", [("carton", "tin")]), ("each", [("carton",), ("tin",)])])
+def test_parts_are_asked_for_together_or_each(labelled, monkeypatch, ask, calls):
+    camera, seen = labelled
+    asked = []
+
+    def answer(view, parts, options, rng):
+        asked.append(tuple(part.name for part in parts))
+        T = inverse(T_WORLD_SENSOR) @ CARTON_AT
+        pose = LocatedPose("carton", CARTON_AT, T, 0.9, 9, 9, 1.0, 0.0)
+        fell = Hypothesis("tin", TIN_AT, 0.1, 0.1, 0.1, (0, 1), "the sensor sees through it")
+        return LocateResult((pose,) if "carton" in asked[-1] else (), (), (fell,), ())
+
+    monkeypatch.setattr(answers, "localize", answer)
+    method = answers.Handey(ask)
+    method.see(LabelledScene("a", DepthView(seen.depth, camera.projection, T_WORLD_SENSOR), True, (CARTON, TIN), judge=None))
+    carton, tin = method.locate((CARTON, TIN))
+    assert asked == calls
+    assert len(carton.poses) == 1 and carton.reason == "" and carton.seconds > 0
+    assert tin.poses == () and tin.reason == "the best hypothesis of tin fell because the sensor sees through it."
+
+
 def test_seeds_are_simulated_once_and_kept(library, tmp_path, monkeypatch):
     small = SceneOptions(bodies=2, size_px=64, clutter=(0, 0))
     made = []
@@ -220,7 +242,7 @@ def test_seeds_are_simulated_once_and_kept(library, tmp_path, monkeypatch):
         return random_scene(seed, library, small)
 
     monkeypatch.setattr("handey_studio.task.bench_locate.labelled_scenes.random_scene", make)
-    monkeypatch.setattr(command, "Handey", lambda: Told({}))
+    monkeypatch.setattr(command, "Handey", lambda ask: Told({}))
     report = run_bench(library, lambda line: None, Silent(), seeds=range(3, 5), scenes=tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0003", "0004"] and len(report["rows"]) == 12
     run_bench(library, lambda line: None, Silent(), seeds=range(3, 4), scenes=tmp_path)
@@ -274,13 +296,13 @@ def test_a_peer_sees_what_lies_above_the_table(labelled, toy):
         assert process.names == ("middle", "knowing")
         peer = peers.Peer(process, "middle")
         peer.see(scene)
-        answer = peer.locate(CARTON)
+        (answer,) = peer.locate([CARTON])
         off = T_WORLD_SENSOR @ answer.poses[0].T_sensor_part[:, 3] - CARTON_AT[:, 3]
         assert np.abs(off[:2]).max() < 0.01 and 0.0 < off[2] < 0.03 and answer.seconds > 0
-        once = peers.Peer(process, "knowing", most=3).locate(CARTON)
+        (once,) = peers.Peer(process, "knowing", most=3).locate([CARTON])
         assert len(once.poses) == 1  # the points that it explains are gone, and hardly any are left
         peer.see(replace(scene, view=DepthView(np.where(seen.body == 0, seen.depth, np.nan), camera.projection, T_WORLD_SENSOR)))
-        nothing = peer.locate(CARTON)
+        (nothing,) = peer.locate([CARTON])
         assert nothing.poses == () and "too few points" in nothing.reason
 
 

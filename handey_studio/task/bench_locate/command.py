@@ -8,7 +8,7 @@ from typing import Any
 
 from handey_studio.base import Progress
 from handey_studio.cell.scenes import CAMERA
-from handey_studio.task.bench_locate.answers import Handey, Method
+from handey_studio.task.bench_locate.answers import TOGETHER, Handey, Method
 from handey_studio.task.bench_locate.labelled_scenes import load_labelled, scene_folders, simulate
 from handey_studio.task.bench_locate.peers import Peer, PeerProcess
 from handey_studio.task.bench_locate.plot import check_plot, plot
@@ -26,16 +26,18 @@ def run_bench(
     seeds: Iterable[int] | None = None,
     scenes: Path | None = None,
     sensor: str = CAMERA,
+    ask: str = TOGETHER,
     peers: bool = False,
     peer_python: str | None = None,
     peer_poses: int = 1,
     plot_to: Path | None = None,
 ) -> dict[str, Any]:
     """Measure and tell. Scenes are those in the folder `scenes`; with `seeds`, those seeds' simulated ones as `sensor` sees them, made
-    there if they are missing; without a folder they are made and forgotten. Raises BadInput, before any work where it can."""
+    there if they are missing; without a folder they are made and forgotten. `ask` for a scene's parts "together" or "each" alone; peers
+    are asked for each. Raises BadInput, before any work where it can."""
     check_plot(plot_to)
     with ExitStack() as open_things:
-        methods: list[Method] = [Handey()]
+        methods: list[Method] = [Handey(ask)]
         if peers or peer_python is not None:
             process = open_things.enter_context(PeerProcess(peer_python))
             methods += [Peer(process, name, peer_poses) for name in process.names]
@@ -47,4 +49,4 @@ def run_bench(
         report = bench_locate(load_labelled(folders, library), methods, tell, progress, len(folders))
     if plot_to is not None and report["rows"]:
         plot(report["summary"], plot_to)
-    return report
+    return report | {"ask": ask}

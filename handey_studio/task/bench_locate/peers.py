@@ -113,7 +113,10 @@ class Peer:
     def see(self, scene: LabelledScene) -> None:
         self._process.show(scene)
 
-    def locate(self, part: Part) -> Answer:
+    def locate(self, parts: Sequence[Part]) -> tuple[Answer, ...]:
+        return tuple(self._one(part) for part in parts)
+
+    def _one(self, part: Part) -> Answer:
         self._process.teach(part)
         told = self._process.ask(do="locate", peer=self.name, part=part.name, most=self._most, least=LEAST_FITNESS)
         poses = [Pose(np.array(pose["T_sensor_part"]), pose["fitness"]) for pose in told["poses"]]

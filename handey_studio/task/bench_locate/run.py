@@ -1,4 +1,4 @@
-"""One question a scene, part and method; every answer judged; the table as JSON values."""
+"""Every method's answers for the parts of every scene, judged; the table as JSON values."""
 
 import os
 import platform
@@ -33,7 +33,7 @@ def bench_locate(
         progress.report(number / (count or number + 1), f"scene {scene.name}: {len(scene.parts)} parts")
         if number == 0:
             warm_up(methods, scene)
-        asked = [_row(scene, part, method) for method in methods for part in _shown(scene, method)]
+        asked = [row for method in methods for row in _rows(scene, method)]
         tell(_line(scene, asked))
         rows += asked
     summary = summarise(rows)
@@ -43,15 +43,14 @@ def bench_locate(
     return {"schema": "handey/bench/locate/1", "machine": machine, "summary": summary, "rows": rows}
 
 
-def _shown(scene: LabelledScene, method: Method) -> tuple[Part, ...]:
+def _rows(scene: LabelledScene, method: Method) -> list[Row]:
+    """A method's answers for a scene's parts, and what the scene's judge says of each."""
     method.see(scene)
-    return scene.parts
+    return [_row(scene, part, method.name, answer) for part, answer in zip(scene.parts, method.locate(scene.parts), strict=True)]
 
 
-def _row(scene: LabelledScene, part: Part, method: Method) -> Row:
-    """One answer and what the scene's judge says of it."""
-    answer = method.locate(part)
-    row = {"scene": scene.name, "part": part.name, "method": method.name, "seconds": answer.seconds, "reason": answer.reason}
+def _row(scene: LabelledScene, part: Part, method: str, answer: Answer) -> Row:
+    row = {"scene": scene.name, "part": part.name, "method": method, "seconds": answer.seconds, "reason": answer.reason}
     return row | judged(scene.judge, part.name, answer)
 
 
