@@ -1,4 +1,4 @@
-"""A slice of the configuration space as a picture: joints 2 and 3 across and up, at the joint 1 of the moment (Handey 1987 §4)."""
+"""A slice of the configuration space as a picture, at the first arm joint's angle now: the second across, the third up (Handey 1987 §4)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,22 +12,23 @@ BLOCKED, FREE = palette.FILLED, (251, 252, 253)
 
 
 def slice_html(space: CSpaceSummary, q: NDArray) -> str:
-    """The slice nearest to joint 1 of a configuration (n,) [rad], with its legend."""
-    number = nearest(space.centres[0], float(q[0]))
+    """The slice nearest to the first arm joint of a configuration (n,) [rad], with its legend."""
+    number = nearest(space.centres[0], float(q[space.joints[0]]))
     chips = ((BLOCKED, "not wholly free"), (palette.BLUE, "free leg (all slices)"), (palette.ORANGE, "the arm now"))
-    words = f"Slice {number + 1} of {len(space.centres[0])}, joint 1 at {np.rad2deg(space.centres[0][number]):.0f}°. "
-    words += "Across: joint 2, up: joint 3. "
+    first, second, third = (joint + 1 for joint in space.joints)
+    words = f"Slice {number + 1} of {len(space.centres[0])}, joint {first} at {np.rad2deg(space.centres[0][number]):.0f}°. "
+    words += f"Across: joint {second}, up: joint {third}. "
     words += f"{np.rad2deg(space.step_rad):.1f}° cells, {100 * space.blocked.mean():.0f} % not wholly free, {space.regions} free regions."
     return html.figure(slice_svg(space, q, number), chips, words)
 
 
 def slice_svg(space: CSpaceSummary, q: NDArray, number: int) -> str:
-    """Cell (j, k) of joints 2 and 3 fills the unit square at x = j and, upwards, y = k."""
+    """Cell (j, k) of the second and third arm joint fills the unit square at x = j and, upwards, y = k."""
     blocked = space.blocked[number]
     columns, rows = blocked.shape
     image = np.where(blocked.T[::-1, :, None], np.array(BLOCKED), np.array(FREE)).astype(np.uint8)
-    across = np.interp(q[1], space.centres[1], np.arange(columns)) + 0.5
-    up = rows - np.interp(q[2], space.centres[2], np.arange(rows)) - 0.5
+    across = np.interp(q[space.joints[1]], space.centres[1], np.arange(columns)) + 0.5
+    up = rows - np.interp(q[space.joints[2]], space.centres[2], np.arange(rows)) - 0.5
     path = " ".join(f"{j + 0.5:.1f},{rows - k - 0.5:.1f}" for _, j, k in space.path_cells)
     here = "".join(
         f'<rect x="{j}" y="{rows - 1 - k}" width="1" height="1" fill="{css(palette.BLUE)}"/>' for i, j, k in space.path_cells if i == number

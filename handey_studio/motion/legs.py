@@ -27,7 +27,7 @@ def leg_to_free(
     Straight lines to the nearest cells first, then a finer grid around q, of which at most `expansions` nodes are looked at.
     """
     for cell in nearest_free(space, q, region, STRAIGHT_TRIES):
-        end = np.concatenate([space.centre(cell), q[3:]])
+        end = space.at(cell, q)
         if mover.moves(q, end):
             return np.array([q, end]), (int(cell[0]), int(cell[1]), int(cell[2]))
     return _fine_leg(mover, space, q, region, expansions) if expansions else None
@@ -50,15 +50,15 @@ def _fine_leg(
         if node in done:
             continue
         done.add(node)
-        here = _angles(q, node)
+        here = _angles(q, space.joints, node)
         cell = space.cell(here)
         if space.regions[cell] == region:
-            end = np.concatenate([space.centre(np.array(cell)), q[3:]])
+            end = space.at(np.array(cell), q)
             if mover.moves(here, end):
-                return np.array([*(_angles(q, n) for n in _chain(parents, node)), end]), cell
+                return np.array([*(_angles(q, space.joints, n) for n in _chain(parents, node)), end]), cell
         for move in _MOVES:
             beside = (node[0] + move[0], node[1] + move[1], node[2] + move[2])
-            there = _angles(q, beside)
+            there = _angles(q, space.joints, beside)
             cost = costs[node] + float(np.linalg.norm(move)) * FINE_STEP_RAD
             if beside in done or cost >= costs.get(beside, np.inf) or (robot.limit_margin(there) < 0).any() or not mover.moves(here, there):
                 continue
@@ -70,9 +70,9 @@ def _fine_leg(
 _MOVES = [(a, b, c) for a, b, c in product((-1, 0, 1), repeat=3) if 1 <= abs(a) + abs(b) + abs(c) <= 2]
 
 
-def _angles(q: NDArray, node: Node) -> NDArray:
+def _angles(q: NDArray, joints: NDArray, node: Node) -> NDArray:
     out = q.copy()
-    out[:3] += np.array(node, dtype=float) * FINE_STEP_RAD
+    out[joints] += np.array(node, dtype=float) * FINE_STEP_RAD
     return out
 
 

@@ -70,7 +70,7 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
     if not ways:
         yield "wrist", np.empty((0, len(asked.start))), [], None, "the wrist finds no way to turn that keeps the hand off the arm"
     for k, (wrists, step, name) in enumerate(plans):
-        progress.report(k / (len(plans) + 1), f"configuration space of joints 1–3, {step:g}° cells")
+        progress.report(k / (len(plans) + 1), f"configuration space of the arm joints, {step:g}° cells")
         found = three_legs(asked, wrists, float(np.deg2rad(step)), fine=True)
         needed = ", ".join(word for word in (name, f"{step:g}° cells" if step != steps[0] else "") if word)
         yield needed, found.points, found.movers, found.space, found.reason
@@ -93,14 +93,14 @@ def _finished(
             entry, certificate.reason, value=certificate.least_clearance, limit=certificate.margin, unit="m", bodies=certificate.bodies
         )
         return None
-    return PathResult("found", "", points, certificate, _legs(points), needed, ledger.entries, space)
+    return PathResult("found", "", points, certificate, _legs(points, asked.world.robot.other_index), needed, ledger.entries, space)
 
 
-def _legs(points: NDArray) -> tuple[Leg, ...]:
+def _legs(points: NDArray, others: NDArray) -> tuple[Leg, ...]:
     """Start: the wrist as at the start; goal: as at the goal; free: while it turns. Cut corners may have left one leg of three."""
     last = len(points) - 1
-    same_start = np.abs(points[:, 3:] - points[0, 3:]).max(axis=1) < 1e-9
-    same_goal = np.abs(points[:, 3:] - points[-1, 3:]).max(axis=1) < 1e-9
+    same_start = np.abs(points[:, others] - points[0, others]).max(axis=1) < 1e-9
+    same_goal = np.abs(points[:, others] - points[-1, others]).max(axis=1) < 1e-9
     if same_start.all():
         return (Leg("free", 0, last),)
     turning, arrived = int(np.argmin(same_start)) - 1, last - int(np.argmin(same_goal[::-1])) + 1

@@ -41,12 +41,13 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class CSpaceSummary(Value):
-    """The configuration space of joints 1–3, to be drawn.
+    """The configuration space of the arm joints, to be drawn.
 
     `blocked` (n1, n2, n3) bool: cells that are not wholly free. Cell k of joint i is centred at `centres[i][k]` [rad].
     `path_cells` (m, 3) the cells of the free leg, `start_cell` and `goal_cell` the nearest free ones to start and goal.
-    `wrist_box` (8, 3) [m] are the corners of the box that stands for the last three links, the hand and what it holds, in
-    the frame of `wrist_box_link`. `regions` counts the free regions. `step_rad` is the cells' width.
+    `wrist_box` (8, 3) [m] are the corners of the box that stands for the wrist's links, the hand and what it holds, in
+    the frame of `wrist_box_link`. `regions` counts the free regions. `step_rad` is the cells' width. `joints` (3,) tell which
+    joints of a configuration these are.
     """
 
     step_rad: float
@@ -58,6 +59,7 @@ class CSpaceSummary(Value):
     wrist_box: NDArray
     wrist_box_link: int
     regions: int
+    joints: tuple[int, ...] = (0, 1, 2)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centres", tuple(frozen_array(c) for c in self.centres))

@@ -10,14 +10,14 @@ from handey_studio.motion.configuration_space import ConfigurationSpace
 
 
 def nearest_free(space: ConfigurationSpace, q: NDArray, region: int, count: int) -> NDArray:
-    """Up to `count` cells (k, 3) of a free region, nearest to the first three joints of q first.
+    """Up to `count` cells (k, 3) of a free region, nearest to the arm joints of q first.
 
     The nearest ones come densely, farther ones more and more thinly: neighbours mostly share one fate.
     """
     cells = np.argwhere(space.regions == region)
     if not len(cells):
         return cells
-    distances = np.linalg.norm(space.centre(cells) - np.asarray(q)[:3], axis=1)
+    distances = np.linalg.norm(space.centre(cells) - np.asarray(q)[space.joints], axis=1)
     keep = min(len(cells), count * count)
     order = np.argpartition(distances, keep - 1)[:keep]
     order = order[np.argsort(distances[order], kind="stable")]
@@ -31,7 +31,7 @@ def regions_by_distance(space: ConfigurationSpace, q_start: NDArray, q_goal: NDA
         return []
     least = []
     for q in (q_start, q_goal):
-        a, b, c = ((centres - angle) ** 2 for centres, angle in zip(space.centres, np.asarray(q)[:3], strict=True))
+        a, b, c = ((centres - angle) ** 2 for centres, angle in zip(space.centres, np.asarray(q)[space.joints], strict=True))
         least.append(np.sqrt(_least_squares(np.array(space.regions), count, a, b, c)))
     total = least[0] + least[1]
     order = np.argsort(total, kind="stable")

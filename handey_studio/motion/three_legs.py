@@ -13,6 +13,7 @@ from handey_studio.motion.query import Query
 from handey_studio.motion.results import CSpaceSummary
 from handey_studio.motion.search import find_cells, regions_by_distance
 from handey_studio.motion.wrist_box import ArmSpheres, arm_spheres
+from handey_studio.world import Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,8 @@ class ThreeLegs:
 
 
 def three_legs(query: Query, wrists: NDArray, step: float, fine: bool) -> ThreeLegs:
-    """The three legs in the space with cells `step` [rad] wide, while the wrist runs through `wrists` (m, 3) [rad] from start to goal.
+    """The three legs in the space with cells `step` [rad] wide, while the joints other than the arm's run through `wrists`
+    (m, joints − 3) [rad] from start to goal.
 
     `fine`: whether the finer grid is used near an end that no straight line leads away from.
     """
@@ -64,7 +66,7 @@ def _free_leg(
         cells = find_cells(blocked, first, last)
         if not len(cells):
             break
-        points, owners = _with_wrist(space.centre(cells), wrists)
+        points, owners = _with_wrist(query.world.robot, space.centre(cells), wrists)
         bad = [k for k in range(len(points) - 1) if not query.free.moves(points[k], points[k + 1])]
         if not bad:
             return points, cells
@@ -76,19 +78,26 @@ def _free_leg(
     return np.empty((0, len(query.start))), np.empty((0, 3))
 
 
-def _with_wrist(arm: NDArray, wrists: NDArray) -> tuple[NDArray, NDArray]:
-    """The arm's corners (k, 3) and the wrist's (m, 3) run through together, each at an even pace; and the arm corner before each point."""
+def _with_wrist(robot: Robot, arm: NDArray, wrists: NDArray) -> tuple[NDArray, NDArray]:
+    """The arm's corners (k, 3) and the wrist's (m, joints − 3) run through together, each at an even pace: configurations (n, joints).
+
+    Also the arm corner before each point.
+    """
     arm = np.repeat(arm, 2, axis=0) if len(arm) == 1 else arm
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(arm, axis=0), axis=1))])
     at_arm = along / along[-1] if along[-1] > 0 else np.linspace(0.0, 1.0, len(arm))
     at_wrist = np.linspace(0.0, 1.0, len(wrists))
     t = np.unique(np.concatenate([at_arm, at_wrist]))
-    columns = [np.interp(t, at_arm, arm[:, i]) for i in range(3)] + [np.interp(t, at_wrist, wrists[:, i]) for i in range(wrists.shape[1])]
-    return np.stack(columns, axis=1), np.searchsorted(at_arm, t, side="right") - 1
+    points = np.empty((len(t), len(robot.joint_names)))
+    points[:, robot.arm_index] = np.stack([np.interp(t, at_arm, column) for column in arm.T], axis=1)
+    points[:, robot.other_index] = np.stack([np.interp(t, at_wrist, column) for column in wrists.T], axis=1)
+    return points, np.searchsorted(at_arm, t, side="right") - 1
 
 
 def summary(
     space: ConfigurationSpace, spheres: ArmSpheres, cells: NDArray, first: tuple[int, ...] | None, last: tuple[int, ...] | None
 ) -> CSpaceSummary:
     """The space as it is drawn."""
-    return CSpaceSummary(space.step, space.centres, space.blocked, cells, first, last, spheres.box, 3, int(space.regions.max()))
+    joints = (int(space.joints[0]), int(space.joints[1]), int(space.joints[2]))
+    regions = int(space.regions.max())
+    return CSpaceSummary(space.step, space.centres, space.blocked, cells, first, last, spheres.box, spheres.carrier, regions, joints)

@@ -1,6 +1,6 @@
 """The arm model of the configuration space: spheres over the arm's links, and over the box that stands for wrist, hand and part.
 
-Handey 1987 §4 replaces the last three links by a box that encloses them, the hand and what it holds, at the start, at the goal
+Handey 1987 §4 replaces the wrist's links by a box that encloses them, the hand and what it holds, at the start, at the goal
 and in between. Here the box is filled with spheres only where something passes, which leaves more of the space free. The
 link that carries the wrist is no obstacle to it.
 """
@@ -20,7 +20,8 @@ from handey_studio.world.collision_bodies import Piece, held_pieces, robot_piece
 
 CHIP_M = 0.025  # what the wrist carries is diced this fine before it is gathered into spheres
 SWEEP_M = 0.01  # how far anything may move from one sampled wrist posture to the next
-LINK_BALLS_M = {1: 0.04, 2: 0.04, 3: 0.06}  # the first two links pass close above the table
+LINK_BALLS_M = 0.04  # the links before the one that carries the wrist pass close above the table
+CARRIER_BALLS_M = 0.06
 BALL_SIZES_M = (0.04, 0.05, 0.06, 0.08, 0.10, 0.14, 0.20)
 MOST_BALLS = 90
 
@@ -29,30 +30,36 @@ Balls = tuple[NDArray, NDArray]  # centres (k, 3), radii (k,) [m]
 
 @dataclass(frozen=True, eq=False)
 class ArmSpheres(Value):
-    """Spheres that enclose the arm: `centres` (k, 3) [m] in the frame of link `links` (k,), 1 to 3, `radii` (k,) [m].
+    """Spheres that enclose the arm: `centres` (k, 3) [m] in the frame of link `links` (k,), `radii` (k,) [m].
 
-    `box` (8, 3) [m] are the corners of the wrist box in the frame of link 3.
+    `box` (8, 3) [m] are the corners of the wrist box in the frame of link `carrier`, the last one that has spheres. They hold while the
+    joints other than the arm's stay within `ranges` (2, joints − 3) [rad].
     """
 
     centres: NDArray
     radii: NDArray
     links: NDArray
     box: NDArray
+    carrier: int
+    ranges: NDArray
 
     def __post_init__(self) -> None:
-        for key, dtype in (("centres", float), ("radii", float), ("links", int), ("box", float)):
+        for key, dtype in (("centres", float), ("radii", float), ("links", int), ("box", float), ("ranges", float)):
             object.__setattr__(self, key, frozen_array(getattr(self, key), dtype))
 
 
 def arm_spheres(robot: Robot, wrists: NDArray, opening: float, held: Held | None) -> ArmSpheres:
-    """The spheres of the arm while its wrist runs joint-linearly through `wrists` (m, 3) [rad], with the fingers `opening` [m] apart."""
+    """The spheres of the arm while its other joints run joint-linearly through `wrists` (m, joints − 3) [rad].
+
+    The fingers are `opening` [m] apart.
+    """
     centres, radii, links = [], [], []
     for piece, (c, r) in _robot_balls(robot):
-        if piece.link in LINK_BALLS_M:
+        if 1 <= piece.link <= robot.carrier:
             centres.append(c)
             radii.append(r)
             links.append(np.full(len(r), piece.link))
-    carried = [pair for pair in _robot_balls(robot) if pair[0].link > 3] + (list(_held_balls(robot, held)) if held else [])
+    carried = [pair for pair in _robot_balls(robot) if pair[0].link > robot.carrier] + (list(_held_balls(robot, held)) if held else [])
     swept, corners = sweep(robot, carried, wrists, opening)
     for size in BALL_SIZES_M:
         c, r = gather(*swept, size)
@@ -60,12 +67,17 @@ def arm_spheres(robot: Robot, wrists: NDArray, opening: float, held: Held | None
             break
     pick = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
     box = np.where(pick, corners.max(axis=0) + SWEEP_M / 2, corners.min(axis=0) - SWEEP_M / 2)
-    return ArmSpheres(np.concatenate([*centres, c]), np.concatenate([*radii, r]), np.concatenate([*links, np.full(len(r), 3)]), box)
+    on = np.concatenate([*links, np.full(len(r), robot.carrier)])
+    ranges = np.array([wrists.min(axis=0), wrists.max(axis=0)])
+    return ArmSpheres(np.concatenate([*centres, c]), np.concatenate([*radii, r]), on, box, robot.carrier, ranges)
 
 
 @lru_cache(maxsize=8)
 def _robot_balls(robot: Robot) -> tuple[tuple[Piece, Balls], ...]:
-    return tuple((piece, dice(piece.corners, LINK_BALLS_M.get(piece.link, CHIP_M))) for piece in robot_pieces(robot))
+    def size(link: int) -> float:
+        return CHIP_M if link > robot.carrier else CARRIER_BALLS_M if link == robot.carrier else LINK_BALLS_M
+
+    return tuple((piece, dice(piece.corners, size(piece.link))) for piece in robot_pieces(robot))
 
 
 @lru_cache(maxsize=32)
@@ -102,12 +114,14 @@ def gather(points: NDArray, sizes: NDArray, size: float) -> Balls:
 
 
 def sweep(robot: Robot, carried: list[tuple[Piece, Balls]], wrists: NDArray, opening: float) -> tuple[Balls, NDArray]:
-    """Balls, and corners (k, 3) [m], in the frame of link 3, of all that the wrist carries at postures close enough together."""
+    """Balls, and corners (k, 3) [m], in the carrier's frame, of all that the wrist carries at postures close enough together."""
     arm = arm_of(robot)
     far = max(float(np.linalg.norm(piece.corners, axis=1).max()) for piece, _ in carried) + opening
-    postures = _postures(wrists, SWEEP_M / (far + np.linalg.norm(arm.T_links[4:, :3, 3], axis=1).sum()))
-    poses = arm.link_poses(np.concatenate([np.zeros((len(postures), 3)), postures], axis=1))
-    Ts = inverse(poses[:, 3:4]) @ poses
+    postures = _postures(wrists, SWEEP_M / (far + np.linalg.norm(arm.T_links[robot.carrier + 1 :, :3, 3], axis=1).sum()))
+    q = np.zeros((len(postures), arm.n))
+    q[:, robot.other_index] = postures
+    poses = arm.link_poses(q)
+    Ts = inverse(poses[:, robot.carrier : robot.carrier + 1]) @ poses
 
     def everywhere(piece: Piece, points: NDArray) -> NDArray:
         T = Ts[:, piece.link]
@@ -119,7 +133,7 @@ def sweep(robot: Robot, carried: list[tuple[Piece, Balls]], wrists: NDArray, ope
 
 
 def _postures(wrists: NDArray, step: float) -> NDArray:
-    """Postures (n, 3) along the polyline `wrists`; from one to the next all angles together change by at most `step` [rad]."""
+    """Postures (n, joints − 3) along the polyline `wrists`; from one to the next all angles together change by at most `step` [rad]."""
     runs = [wrists[:1]]
     for a, b in pairwise(wrists):
         n = 1 + int(np.ceil(np.abs(b - a).sum() / step))

@@ -1,7 +1,7 @@
 """How the wrist may turn from the start's posture to the goal's without the hand meeting the forearm.
 
 The paper interpolates; where that makes the wrist or the hand pass through the arm that carries them, no place of the
-first three joints helps, and the wrist goes by way of another posture.
+arm joints helps, and the wrist goes by way of another posture.
 """
 
 import numpy as np
@@ -17,20 +17,24 @@ DRAWN = 200  # wrist postures drawn at random when the straight way is closed
 
 
 def wrist_ways(query: Query, rng: np.random.Generator, most: int) -> list[tuple[str, NDArray]]:
-    """Up to `most` ways, corners (2 or 3, wrist joints) [rad], each with its name: the straight one, unnamed, and one by the home wrist.
+    """Up to `most` ways of the joints other than the arm's, corners (2 or 3, joints − 3) [rad], each with its name.
 
+    The straight one, unnamed, and one by the home wrist.
     Where the straight one is closed, the shortest ones by way of the home wrist and of postures drawn at random.
+    Held joints go straight from their value at the start to that at the goal.
     """
-    start, goal = query.start[3:], query.goal[3:]
+    robot, others = query.world.robot, query.world.robot.other_index
+    start, goal = query.start[others], query.goal[others]
     ways = [("", np.array([start, goal]))] if wrist_turns(query.free, start, goal) else []
-    lower, upper = query.world.robot.lower[3:], query.world.robot.upper[3:]
-    home = query.world.robot.home[3:]
+    lower, upper, home = robot.lower[others], robot.upper[others], robot.home[others]
     turned = home + 2 * np.pi * np.round(((start + goal) / 2 - home) / (2 * np.pi))
     inside = ((turned >= lower) & (turned <= upper)).all()
     names = {0: "the home wrist in between"}
     low, high = np.minimum(start, goal) - np.pi / 2, np.maximum(start, goal) + np.pi / 2
     drawn = rng.uniform(np.maximum(low, lower), np.minimum(high, upper), (DRAWN, len(start)))
     between = np.concatenate([(turned if inside else home)[None], drawn])
+    held = np.isin(others, robot.held_index)
+    between[:, held] = (start[held] + goal[held]) / 2
     lengths = np.abs(between - start).sum(axis=1) + np.abs(between - goal).sum(axis=1)
     for k in np.argsort(lengths, kind="stable") if not ways else (0,):
         if len(ways) >= most:
@@ -42,10 +46,11 @@ def wrist_ways(query: Query, rng: np.random.Generator, most: int) -> list[tuple[
 
 def wrist_turns(mover: Mover, start: NDArray, end: NDArray) -> bool:
     """Whether wrist, hand and part are proved to stay clear of the forearm and of each other while the wrist turns straight."""
-    shapes = mover.bodies.shapes
-    shapes = shapes._replace(pairs=np.ascontiguousarray(shapes.pairs[shapes.link[shapes.pairs].min(axis=1) >= 3]))
+    robot, shapes = mover.model.world.robot, mover.bodies.shapes
+    shapes = shapes._replace(pairs=np.ascontiguousarray(shapes.pairs[shapes.link[shapes.pairs].min(axis=1) >= robot.carrier]))
     nothing = terrain_obstacles(None, 0.0, 0.0)
-    arm = np.zeros(3)
-    motion = Motion(np.concatenate([arm, start]), np.concatenate([arm, end]), mover.opening, mover.opening)
+    ends = np.zeros((2, len(robot.joint_names)))
+    ends[:, robot.other_index] = start, end
+    motion = Motion(ends[0].copy(), ends[1].copy(), mover.opening, mover.opening)
     scene = Scene(nothing, nothing, mover.scene.rules)
     return Verdict(*prove(mover.model.chain, shapes, scene, motion, float(mover.margin), 0.0)).outcome == PROVED

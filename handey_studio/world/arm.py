@@ -59,7 +59,7 @@ class Arm:
         locked = [full.getJointId(name) for name in list(full.names)[1:] if name not in robot.joint_names]
         self.model, collision = pin.buildReducedModel(full, collision, locked, pin.neutral(full))
         if tuple(list(self.model.names)[1:]) != robot.joint_names:
-            raise BadInput(f'robot "{robot.name}": arm_joints and wrist_joints must follow the chain {list(self.model.names)[1:]}.')
+            raise BadInput(f'robot "{robot.name}": joints must follow the chain {list(self.model.names)[1:]}.')
         if not self.model.existFrame(robot.flange):
             raise BadInput(f'robot "{robot.name}": the URDF has no frame "{robot.flange}"; name its flange frame.')
         self.T_links = frozen_array([M.homogeneous for M in list(self.model.jointPlacements)[1:]])

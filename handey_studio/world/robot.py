@@ -4,6 +4,7 @@ import os
 import tomllib
 from dataclasses import dataclass, replace
 from importlib import metadata
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,12 @@ FINGERS = ("finger_left", "finger_right")
 
 @dataclass(frozen=True, eq=False)
 class Robot(Value):
-    """An arm with a hand. Angles in radians, one number a joint, in `joint_names` order (arm joints, then wrist joints)."""
+    """An arm with a hand. Angles in radians, one number a joint, in the order of `joint_names`, which is the chain's.
+
+    The three `arm_joints` span the configuration space, the `wrist_joints` follow the last of them. A redundant arm has h `held_joints`
+    as well: inverse kinematics tries them at each row of `held_values` (m, h) [rad] in turn. `arm_index`, `wrist_index` and `held_index`
+    pick them out of a configuration, `other_index` all but the arm's. Link `carrier`, moved by the last arm joint, carries the wrist.
+    """
 
     name: str
     urdf: str
@@ -73,8 +79,11 @@ class Robot(Value):
     ik: str
     flange: str
     T_world_base: NDArray
+    joint_names: tuple[str, ...]
     arm_joints: tuple[str, ...]
     wrist_joints: tuple[str, ...]
+    held_joints: tuple[str, ...]
+    held_values: NDArray
     lower: NDArray
     upper: NDArray
     velocity: NDArray
@@ -84,12 +93,33 @@ class Robot(Value):
     hand: Hand
 
     def __post_init__(self) -> None:
-        for key in ("T_world_base", "lower", "upper", "velocity", "acceleration", "home"):
+        for key in ("T_world_base", "held_values", "lower", "upper", "velocity", "acceleration", "home"):
             object.__setattr__(self, key, frozen_array(getattr(self, key)))
 
     @property
-    def joint_names(self) -> tuple[str, ...]:
-        return self.arm_joints + self.wrist_joints
+    def arm_index(self) -> NDArray:
+        return self._index(self.arm_joints)
+
+    @property
+    def wrist_index(self) -> NDArray:
+        return self._index(self.wrist_joints)
+
+    @property
+    def held_index(self) -> NDArray:
+        return self._index(self.held_joints)
+
+    @property
+    def other_index(self) -> NDArray:
+        """Held and wrist joints, in the chain's order."""
+        return np.delete(np.arange(len(self.joint_names)), self.arm_index)
+
+    @property
+    def carrier(self) -> int:
+        """Number of the link that carries the wrist, where 0 is the base and i is what joint i carries."""
+        return int(self.arm_index[-1]) + 1
+
+    def _index(self, names: tuple[str, ...]) -> NDArray:
+        return np.array([self.joint_names.index(name) for name in names], dtype=int)
 
     def limit_margin(self, q: NDArray) -> NDArray:
         """Least distance [rad] to a joint limit, for configurations (..., n); negative outside."""
@@ -114,12 +144,12 @@ def load_robot(folder: str | os.PathLike) -> Robot:
 
 
 def _robot(table: dict[str, Any], folder: Path) -> Robot:
-    joints = table["arm_joints"] + table["wrist_joints"]
+    arm, wrist, held, joints = _joints(table)
     urdf, packages = _urdf_path(table["urdf"], folder)
     base = table.get("base", {})
     limits = table["limits"]
     columns = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
-    per_joint = {key: _numbers(limits[key], key, len(joints)) for key in columns}
+    per_joint = {key: np.deg2rad(_numbers(limits[key], key, len(joints))) for key in columns}
     robot = Robot(
         name=table["name"],
         urdf=urdf,
@@ -127,21 +157,49 @@ def _robot(table: dict[str, Any], folder: Path) -> Robot:
         ik=table["ik"],
         flange=table["flange"],
         T_world_base=from_xyz_rpy(base.get("xyz_m", (0, 0, 0)), np.deg2rad(base.get("rpy_deg", (0, 0, 0)))),
-        arm_joints=tuple(table["arm_joints"]),
-        wrist_joints=tuple(table["wrist_joints"]),
-        lower=np.deg2rad(per_joint["lower_deg"]),
-        upper=np.deg2rad(per_joint["upper_deg"]),
-        velocity=np.deg2rad(per_joint["velocity_deg_s"]),
-        acceleration=np.deg2rad(per_joint["acceleration_deg_s2"]),
+        joint_names=joints,
+        arm_joints=arm,
+        wrist_joints=wrist,
+        held_joints=tuple(held),
+        held_values=np.deg2rad(np.array(list(product(*held.values())), dtype=float)),
+        lower=per_joint["lower_deg"],
+        upper=per_joint["upper_deg"],
+        velocity=per_joint["velocity_deg_s"],
+        acceleration=per_joint["acceleration_deg_s2"],
         home=np.deg2rad(_numbers(table["home_deg"], "home_deg", len(joints))),
         ignored_bodies=tuple(table.get("ignored_bodies", ())),
         hand=_hand(table["hand"]),
     )
-    if len(robot.arm_joints) != 3:
-        raise ValueError(f"arm_joints names {len(robot.arm_joints)} joints, it takes exactly 3: the configuration space's.")
+    _check_limits(robot)
+    return robot
+
+
+def _joints(table: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...], dict[str, list[float]], tuple[str, ...]]:
+    """Arm joints, wrist joints, held joints with their values [deg], and all of them in the chain's order."""
+    arm, wrist = tuple(table["arm_joints"]), tuple(table["wrist_joints"])
+    held = {name: _numbers(values, f"held_joints.{name}") for name, values in table.get("held_joints", {}).items()}
+    joints = tuple(table["joints"]) if held else tuple(table.get("joints", arm + wrist))
+    if len(arm) != 3:
+        raise ValueError(f"arm_joints names {len(arm)} joints, it takes exactly 3: the configuration space's.")
+    if sorted(joints) != sorted({*arm, *wrist, *held}) or len(joints) != len(arm) + len(wrist) + len(held):
+        raise ValueError(f"joints lists {list(joints)}; it must name each of arm_joints, wrist_joints and held_joints once.")
+    if tuple(name for name in joints if name in arm + wrist) != arm + wrist:
+        raise ValueError(f"the arm joints, then the wrist joints must follow the chain {list(joints)}, as {list(arm + wrist)} do not.")
+    return arm, wrist, held, joints
+
+
+def _check_limits(robot: Robot) -> None:
+    if not (robot.lower < robot.upper).all():
+        joint = robot.joint_names[int(np.argmin(robot.upper - robot.lower))]
+        raise ValueError(f"the limits of {joint} are empty; lower_deg must lie below upper_deg.")
+    for key in ("velocity", "acceleration"):
+        if not (getattr(robot, key) > 0).all():
+            raise ValueError(f"every {key} limit must be above 0.")
     if (robot.limit_margin(robot.home) < 0).any():
         raise ValueError("home_deg lies outside the joint limits; choose a home inside them.")
-    return robot
+    held = robot.held_index
+    if ((robot.held_values < robot.lower[held]) | (robot.held_values > robot.upper[held])).any():
+        raise ValueError("held_joints has values outside the joint limits; choose values inside them.")
 
 
 def _hand(table: dict[str, Any]) -> Hand:
@@ -158,9 +216,11 @@ def _hand(table: dict[str, Any]) -> Hand:
     return hand
 
 
-def _numbers(values: Any, key: str, count: int) -> list[float]:
-    if not isinstance(values, list) or len(values) != count or not all(isinstance(v, (int, float)) and np.isfinite(v) for v in values):
-        raise ValueError(f"{key} must list {count} finite numbers, one a joint.")
+def _numbers(values: Any, key: str, count: int | None = None) -> list[float]:
+    """A list of `count` finite numbers, or of at least one."""
+    finite = isinstance(values, list) and all(isinstance(v, (int, float)) and np.isfinite(v) for v in values)
+    if not finite or len(values) != (count or max(len(values), 1)):
+        raise ValueError(f"{key} must list {f'{count} finite numbers, one a joint' if count else 'at least one finite number'}.")
     return [float(v) for v in values]
 
 
