@@ -15,6 +15,7 @@ from handey_studio.world import Library, Robot, arm_of, load_robot
 from handey_studio.world.library import bundled
 
 AHEAD = np.deg2rad([0.0, -110.0, 110.0, -90.0, -90.0, 0.0])
+OPEN = 0.09  # the bundled hand as wide as it goes [m]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from handey_studio.cell.shapes import Shape, body_shape, depth
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
 from handey_studio.world import arm_of
-from tests.cell.conftest import over_l_block, raised
+from tests.cell.conftest import OPEN, over_l_block, raised
 
 NAME = "l_block#2"
 FINGERS = (("finger_left", NAME), ("finger_right", NAME))
@@ -26,13 +26,13 @@ def plan(cell, arms):
     above = arms.at(raised(T_hand, 0.12), cell.joints())
     down = arms.line(raised(T_hand, 0.12), T_hand, above)
     return [
-        arms.step("free", [cell.joints(), above], 0.1),
-        arms.step("approach", down, np.linspace(0.1, 0.06, len(down))),
+        arms.step("free", [cell.joints(), above], OPEN),
+        arms.step("approach", down, np.linspace(OPEN, 0.06, len(down))),
         arms.step("close", [down[-1]] * 2, (0.06, 0.04), allowed=FINGERS),
         arms.step("lift", down[::-1], 0.04, NAME, FINGERS + SUPPORT),
         arms.step("place", down, 0.04, NAME, FINGERS + SUPPORT),
-        arms.step("open", [down[-1]] * 2, (0.04, 0.1), None, FINGERS),
-        arms.step("retreat", down[::-1], 0.1, None, FINGERS),
+        arms.step("open", [down[-1]] * 2, (0.04, OPEN), None, FINGERS),
+        arms.step("retreat", down[::-1], OPEN, None, FINGERS),
     ]
 
 
@@ -54,7 +54,7 @@ def test_a_clean_plan_passes_at_a_fine_step(plan, cell, robot, called):
 def test_a_body_in_the_way_is_told_by_name_step_and_time(plan, cell, arms, robot, called):
     q = 0.7 * plan[0].q_rad[0] + 0.3 * plan[0].q_rad[1]
     post = SolidBody("post", box((0.03, 0.03, 0.03)), transform(None, arm_of(robot).hand_pose(q)[:3, 3]))
-    waiting = arms.step("free", plan[0].q_rad[[0, 0]], 0.1)
+    waiting = arms.step("free", plan[0].q_rad[[0, 0]], OPEN)
     report = check_plan([waiting, plan[0]], [*cell.true_scene(), post], robot, called)
     assert {violation.step for violation in report.violations} == {1}
     assert reasons(report) == {"bodies collide"}
@@ -105,7 +105,7 @@ def test_the_held_body_collides_too(plan, cell, robot, called):
 
 def test_a_body_put_down_stays_where_the_hand_let_go_of_it(plan, cell, arms, robot, called):
     """The fingers close freely once they are above it, and hit it when they come down again."""
-    shut = arms.step("free", plan[6].q_rad[[-1, -1]], (0.1, 0.02))
+    shut = arms.step("free", plan[6].q_rad[[-1, -1]], (OPEN, 0.02))
     again = replace(plan[1], hand_opening_m=np.full(len(plan[1].q_rad), 0.02))
     report = check_plan([*plan, shut, again], cell.true_scene(), robot, called)
     assert {violation.step for violation in report.violations} == {8}
@@ -123,7 +123,7 @@ def test_limits_speed_and_seams(plan, cell, robot, called):
     assert reasons(check_plan([plan[0], plan[6]], scene, robot, called)) >= {"the arm jumps between steps"}
     wide = replace(plan[1], hand_opening_m=plan[1].hand_opening_m - 0.01)
     assert "the fingers jump between steps" in reasons(check_plan([plan[0], wide], scene, robot, called))
-    agape = replace(plan[0], hand_opening_m=np.array([0.1, 0.12]))
+    agape = replace(plan[0], hand_opening_m=np.array([OPEN, 0.12]))
     assert "beyond the hand's opening" in reasons(check_plan([agape], scene, robot, called))
 
 
@@ -132,7 +132,7 @@ def test_the_arm_may_not_hit_itself(robot):
     folded[1], folded[2] = np.deg2rad(-90), np.deg2rad(170)
     still = type("Still", (), {})()
     still.kind, still.q_rad, still.time_s = "free", np.array([folded, folded]), np.array([0.0, 1.0])
-    still.hand_opening_m, still.held, still.allowed_contacts = np.array([0.1, 0.1]), None, ()
+    still.hand_opening_m, still.held, still.allowed_contacts = np.array([OPEN, OPEN]), None, ()
     report = check_plan([still], [], robot)
     assert reasons(report) == {"bodies collide"}
     still.q_rad = np.array([robot.home, robot.home])

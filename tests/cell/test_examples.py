@@ -13,7 +13,7 @@ from handey_studio.cell.physics import settle
 from handey_studio.cell.stripes import Surfaces
 from handey_studio.geometry.transforms import apply, inverse, pose_difference
 from handey_studio.world import arm_of
-from tests.cell.conftest import AHEAD, over_l_block, raised
+from tests.cell.conftest import AHEAD, OPEN, over_l_block, raised
 
 
 def bodies_of(library):
@@ -67,8 +67,8 @@ def test_the_task_can_be_done(library, arms, robot, cell):
     place = arms.line(raised(T_put, 0.10), T_put, arms.at(raised(T_put, 0.10), down[0]))
     fingers = (("finger_left", name), ("finger_right", name))
     steps = [
-        arms.step("free", [AHEAD, down[0]], 0.1),
-        arms.step("approach", down, np.linspace(0.1, 0.06, len(down))),
+        arms.step("free", [AHEAD, down[0]], OPEN),
+        arms.step("approach", down, np.linspace(OPEN, 0.06, len(down))),
         arms.step("close", [down[-1]] * 2, (0.06, 0.04), allowed=fingers),
         arms.step("lift", down[::-1], 0.04, name, (*fingers, (name, "table"), (name, "depth map"))),
         arms.step("transfer", [down[0], place[0]], 0.04, name, fingers),

@@ -10,7 +10,7 @@ from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.cell.workcell import SimulatedSetup, TrueBody, Workcell
 from handey_studio.geometry.transforms import from_xyz_rpy, pose_difference, transform
 from handey_studio.world import arm_of
-from tests.cell.conftest import over_l_block, raised
+from tests.cell.conftest import OPEN, over_l_block, raised
 
 GRASP_POINT = (0.0147, 0.015, 0.02)  # of the hooked L, in the corner of its foot and leg
 
@@ -61,7 +61,7 @@ def test_a_part_is_gripped_lifted_set_down_and_let_go(cell, arms, robot):
 
 def test_a_part_let_go_in_the_air_falls(cell, arms):
     lifted(cell, arms)
-    cell.grip(0.1)
+    cell.grip(OPEN)
     T = cell.true_pose("l_block#2")
     corners = next(body for body in cell.true_scene() if body.name == "l_block#2").corners_world
     assert corners[:, 2].min() == pytest.approx(0.0, abs=5e-4) or T[2, 3] < 0.12
@@ -76,7 +76,7 @@ def test_what_leaned_on_a_lifted_body_falls(library, arms):
     T_hand = transform(np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]], float), cell.true_pose("wall")[:3, 3] + (0.0, 0, 0.02))
     above = arms.at(raised(T_hand, 0.1), cell.joints())
     down = arms.line(raised(T_hand, 0.1), T_hand, above)
-    cell.follow(arms.step("free", [cell.joints(), above], 0.1).motion)
+    cell.follow(arms.step("free", [cell.joints(), above], OPEN).motion)
     cell.follow(arms.step("approach", down, 0.08).motion)
     cell.grip(0.0)
     assert cell.held_truly() == "wall"
@@ -87,7 +87,7 @@ def test_what_leaned_on_a_lifted_body_falls(library, arms):
 def test_a_guarded_motion_without_touch_runs_to_its_end(cell, arms):
     T_hand = arm_of(arms.robot).hand_pose(cell.joints())
     up = arms.line(T_hand, raised(T_hand, 0.05), cell.joints())
-    moved = cell.descend(arms.step("place", up, 0.1).motion)
+    moved = cell.descend(arms.step("place", up, OPEN).motion)
     assert not moved.contact and np.allclose(moved.q_rad, up[-1])
 
 
@@ -95,8 +95,8 @@ def test_the_bare_hand_feels_the_table(library, arms):
     cell = SimulatedCell(Workcell(), library)
     T_hand = transform(np.diag([1.0, -1.0, -1.0]), (0.45, 0.1, 0.05))
     above = arms.at(T_hand, cell.joints())
-    cell.follow(arms.step("free", [cell.joints(), above], 0.1).motion)
-    moved = cell.descend(arms.step("place", arms.line(T_hand, raised(T_hand, -0.07), above), 0.1).motion)
+    cell.follow(arms.step("free", [cell.joints(), above], OPEN).motion)
+    moved = cell.descend(arms.step("place", arms.line(T_hand, raised(T_hand, -0.07), above), OPEN).motion)
     assert moved.contact
     assert arm_of(arms.robot).hand_pose(cell.joints())[2, 3] == pytest.approx(0.0, abs=3e-5)
 
@@ -116,7 +116,7 @@ def test_the_scan_leaves_out_what_the_hand_holds(cell, arms):
 
 def test_motions_that_an_arm_could_not_start_are_refused(cell, robot):
     q, times = cell.joints(), np.array([0.0, 1.0])
-    opening = np.array([0.1, 0.1])
+    opening = np.array([OPEN, OPEN])
     bad = [
         (np.array([q + 0.1, q]), times, opening, "starts 0.100 rad"),
         (np.array([q, np.full(6, 99.0)]), times, opening, "joint limits"),
@@ -148,7 +148,7 @@ def test_a_setup_that_makes_no_sense_is_refused_in_a_sentence(library):
 
 def test_the_state_now_makes_the_same_cell_again(cell, library, arms):
     lifted(cell, arms)
-    cell.grip(0.1)
+    cell.grip(OPEN)
     again = SimulatedCell(Workcell(setup=cell.setup_now()), library)
     for body in cell.true_scene():
         assert np.array_equal(again.true_pose(body.name), body.T_world_body)

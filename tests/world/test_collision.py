@@ -155,7 +155,7 @@ def test_unread_columns_are_solid_to_the_ceiling():
 
 def test_no_pair_of_this_robot_always_touches_and_home_is_free():
     assert always_touching(ROBOT) == frozenset()
-    assert collision_model(World(ROBOT)).clearance(ROBOT.home, 0.1).keeps(0.01)
+    assert collision_model(World(ROBOT)).clearance(ROBOT.home, ROBOT.hand.opening_max).keeps(0.01)
 
 
 def test_a_turned_depth_map_stands_where_it_is():
