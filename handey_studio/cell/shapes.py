@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.penetration import Polytope, overlap, polytope, polytopes_of
+from handey_studio.geometry import hull_triangles
 from handey_studio.geometry.transforms import inverse
-from handey_studio.world.arm import LinkBody
+from handey_studio.world.link_body import LinkBody
 
 fcl: Any = import_module("fcl")  # compiled, without type information
 
@@ -77,7 +77,7 @@ def link_shape(link: LinkBody) -> Shape:
 
 def box_shape(name: str, corners: NDArray) -> Shape:
     """One of the hand's boxes, corners (8, 3) [m]."""
-    return Shape(name, corners, ConvexHull(corners).simplices, (polytope(corners),))
+    return Shape(name, corners, hull_triangles(corners), (polytope(corners),))
 
 
 def body_shape(name: str, body: SolidBody) -> Shape:

@@ -36,3 +36,11 @@ def convex_pieces(solid: Polyhedron) -> tuple[NDArray, ...]:
         if len(done) + len(todo) > MAX_PIECES:
             raise BadInput(f"the part falls into more than {MAX_PIECES} convex pieces; simplify its shape.")
     return tuple(done)
+
+
+def hull_triangles(corners: NDArray) -> NDArray:
+    """Triangles (m, 3) of the hull of corners (n, 3), outward."""
+    hull = ConvexHull(corners)
+    a, b, c = (corners[hull.simplices[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    return np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)

@@ -1,7 +1,8 @@
 """What the planner believes: parts, robots, the hand, the world; and the living arm model."""
 
-from handey_studio.world.arm import Arm, LinkBody, arm_of, hand_hulls
+from handey_studio.world.arm import Arm, arm_of, hand_hulls
 from handey_studio.world.library import Library
+from handey_studio.world.link_body import LinkBody
 from handey_studio.world.model_files import read_part, write_obj
 from handey_studio.world.part import Held, Mate, Part, PlacedPart
 from handey_studio.world.robot import FINGERS, Hand, Robot, load_robot

@@ -1,10 +1,8 @@
 """The living arm: forward kinematics, IK and collision bodies of a robot, built once in each process from its URDF."""
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import import_module
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,35 +10,14 @@ from numpy.typing import NDArray
 from handey_studio.base import BadInput, frozen_array
 from handey_studio.geometry.transforms import inverse
 from handey_studio.world.ik import IK_SOLVERS
+from handey_studio.world.link_body import link_body
 from handey_studio.world.robot import Robot
-
-if TYPE_CHECKING:
-    import trimesh
 
 
 @lru_cache(maxsize=1)
 def _pinocchio() -> Any:
     """Pinocchio, which is compiled and has no type information; imported when an arm is first built, as it takes half a second."""
     return import_module("pinocchio")
-
-
-FULL_SHARE = 0.8  # a link that fills this share of its hull is taken for it
-SLICES = 4
-
-
-@dataclass(frozen=True)
-class LinkBody:
-    """A link's collision geometry. `link` counts the moving links: 0 is the fixed base, i is what joint i carries.
-
-    `hulls`, each (n, 3) [m] in the link's frame, are the corners of convex pieces that together hold the link: its hull, or the hulls of
-    a few slices across its length where one hull would hold much air. `vertices` and `triangles` are its exact mesh.
-    """
-
-    name: str
-    link: int
-    hulls: tuple[NDArray, ...]
-    vertices: NDArray
-    triangles: NDArray
 
 
 class Arm:
@@ -50,7 +27,8 @@ class Arm:
         self.robot = robot
         pin = _pinocchio()
         try:
-            full, collision, _ = pin.buildModelsFromUrdf(robot.urdf, [robot.packages])
+            full = pin.buildModelFromUrdf(robot.urdf)
+            collision = pin.buildGeomFromUrdf(full, robot.urdf, pin.GeometryType.COLLISION, package_dirs=[robot.packages])
         except (ValueError, RuntimeError) as error:
             raise BadInput(f'robot "{robot.name}": the URDF "{robot.urdf}" does not load: {error}') from None
         missing = [name for name in robot.joint_names if not full.existJointName(name)]
@@ -68,7 +46,7 @@ class Arm:
         """Axis (n, 3) of each joint in its own frame."""
         self.T_last_flange = frozen_array(self.model.frames[self.model.getFrameId(robot.flange)].placement.homogeneous)
         self.T_last_hand = frozen_array(self.T_last_flange @ robot.hand.T_flange_hand)
-        self.bodies = tuple(_link_body(g) for g in collision.geometryObjects if g.name not in robot.ignored_bodies)
+        self.bodies = tuple(link_body(g) for g in collision.geometryObjects if g.name not in robot.ignored_bodies)
 
     @property
     def n(self) -> int:
@@ -137,55 +115,6 @@ def _joint_axis(model: Any, joint: int) -> NDArray:
     if np.abs(column[:3]).max() > 1e-9 or model.joints[joint].nv != 1:
         raise BadInput(f'joint "{model.names[joint]}" does not turn about one axis; arms with sliding joints are not supported.')
     return np.round(column[3:], 12)
-
-
-def _link_body(geometry: Any) -> LinkBody:
-    """Mesh of a collision object in its link's frame."""
-    import trimesh  # slow to import, and only arms and foreign meshes need it
-
-    path = geometry.meshPath
-    if path and path not in ("BOX", "CYLINDER", "SPHERE"):
-        mesh = trimesh.load_mesh(path)
-        mesh.apply_scale(np.asarray(geometry.meshScale).reshape(3))
-    else:
-        mesh = _primitive(geometry)
-    mesh.apply_transform(geometry.placement.homogeneous)
-    return LinkBody(
-        name=geometry.name.rsplit("_", 1)[0],
-        link=geometry.parentJoint,
-        hulls=_hulls(mesh),
-        vertices=frozen_array(mesh.vertices),
-        triangles=frozen_array(mesh.faces, int),
-    )
-
-
-def _hulls(mesh: "trimesh.Trimesh") -> tuple[NDArray, ...]:
-    """Convex pieces that hold a mesh."""
-    whole = mesh.convex_hull
-    if not mesh.is_watertight or mesh.volume > FULL_SHARE * whole.volume:
-        return (frozen_array(whole.vertices),)
-    axis = np.eye(3)[int(np.argmax(mesh.extents))]
-    low, high = (float(corner @ axis) for corner in mesh.bounds)
-    cuts = np.linspace(low, high, SLICES + 1)
-    pieces = []
-    for start, end in pairwise(cuts):
-        beyond = mesh.slice_plane(axis * start, axis)
-        piece = beyond.slice_plane(axis * end, -axis)
-        pieces.append(frozen_array(piece.convex_hull.vertices))
-    return tuple(pieces)
-
-
-def _primitive(geometry: Any) -> "trimesh.Trimesh":
-    import trimesh
-
-    shape = geometry.geometry
-    if hasattr(shape, "halfSide"):
-        return trimesh.creation.box(2 * np.asarray(shape.halfSide))
-    if hasattr(shape, "halfLength"):
-        return trimesh.creation.cylinder(shape.radius, 2 * shape.halfLength, sections=24)
-    if hasattr(shape, "radius"):
-        return trimesh.creation.icosphere(radius=shape.radius)
-    raise BadInput(f'collision shape of "{geometry.name}" is not supported; use a mesh, box, cylinder or sphere.')
 
 
 def hand_hulls(robot: Robot, opening: float) -> dict[str, NDArray]:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
+from handey_studio.geometry import hull_triangles
 from handey_studio.geometry.transforms import inverse
 from handey_studio.world.arm import arm_of
 from handey_studio.world.collision_bodies import (
@@ -256,10 +256,7 @@ def fcl_box(corners: NDArray) -> fcl.CollisionObject:
 
 def fcl_convex(corners: NDArray) -> fcl.Convex:
     """FCL's convex body of corners (k, 3) [m]: its faces are outward loops, each led by its number of corners."""
-    hull = ConvexHull(corners)
-    a, b, c = (corners[hull.simplices[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    triangles = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+    triangles = hull_triangles(corners)
     faces = np.concatenate([np.full((len(triangles), 1), 3), triangles], axis=1).reshape(-1)
     return fcl.Convex(np.array(corners), len(triangles), faces)
 

@@ -111,10 +111,10 @@ def test_the_notch_of_an_l_is_empty():
     """A concave part given as its hull would fill its notch."""
     placed = PlacedPart("l#1", L_BLOCK, np.eye(4))
     model = collision_model(World(ROBOT, table_z=-0.1, parts=(placed,)))
-    tip = np.array([[0.041, 0.045, 0.01]])
+    tip = np.array([[0.04, 0.048, 0.01]])
     assert naive_distance(L_BLOCK.solid.vertices, tip) < 1e-6
     closed = model.hand_contact(transform(DOWN[:3, :3], tip[0]), 0.0)
-    assert closed.distance == pytest.approx(0.041 - 0.008 - 0.03, abs=1e-6)
+    assert closed.distance == pytest.approx(0.04 - ROBOT.hand.finger_thickness - 0.03, abs=1e-6)
 
 
 def test_held_part_and_allowed_pairs():
