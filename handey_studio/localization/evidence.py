@@ -13,6 +13,8 @@ from handey_studio.sensing.depth_view import DepthView, Pinhole
 
 DIRECTIONS = 6  # sectors of edge directions in the image
 SECTOR = np.pi / DIRECTIONS
+U, V, X, Y, Z, KIND = range(6)  # columns of edge pixels
+TAN_15 = float(np.tan(SECTOR / 2))
 
 
 class Limits(NamedTuple):
@@ -31,16 +33,15 @@ class Limits(NamedTuple):
 class Evidence(NamedTuple):
     """Arrays that the compiled verifier reads.
 
-    `depth` (H, W) [m]; `nearest` (DIRECTIONS, H, W) number of the nearest
-    edge pixel whose direction is about that of the sector, −1 for none; `edge_uv` (n, 2) [px], `edge_point` (n, 3) [m],
-    `edge_kind` (n,) JUMP, CONVEX or CONCAVE. `camera`: 1 if parallel, scale x, scale y, cx, cy, as in `project`; `pixel` [m].
+    `depth` (H, W) [m]; `nearest` (DIRECTIONS, H, W) number of the nearest edge pixel whose direction is about that of the sector, −1 for
+    none; `edges` (n, 6) of edge pixels: U, V [px], the point X, Y, Z [m], and the KIND, JUMP, CONVEX or CONCAVE. `camera`: 1 if
+    parallel, scale x, scale y, cx, cy, as in `project`; `pixel` [m]. Inner loops take the arrays one by one: compiled code
+    that takes them out of a tuple each time spends most of its time counting references to them.
     """
 
     depth: NDArray
     nearest: NDArray
-    edge_uv: NDArray
-    edge_point: NDArray
-    edge_kind: NDArray
+    edges: NDArray
     camera: tuple[float, float, float, float, float]
     pixel: float
 
@@ -69,7 +70,7 @@ def evidence_of(view: DepthView, surface: Surface, linked: Linked) -> Evidence:
     camera = (0.0, p.fx, p.fy, p.cx, p.cy) if pinhole else (1.0, 1.0 / p.pixel, 1.0 / p.pixel, p.cx, p.cy)
     uv = np.stack([u, v], axis=1).astype(float)
     points = view.projection.unproject(uv, view.depth[v, u])
-    return Evidence(np.array(view.depth), nearest, uv, points, linked.kind[members], camera, surface.pixel)
+    return Evidence(np.array(view.depth), nearest, np.column_stack([uv, points, linked.kind[members]]), camera, surface.pixel)
 
 
 def _nearest(shape: tuple[int, ...], u: NDArray, v: NDArray, numbers: NDArray) -> NDArray:
@@ -93,42 +94,52 @@ def _segment_directions(linked: Linked) -> NDArray:
     return 0.5 * np.arctan2(2 * np.bincount(segment, du * dv), np.bincount(segment, du * du) - np.bincount(segment, dv * dv))
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def project(x, y, z, camera):
     """(u, v) [px] of a point in the sensor's frame."""
     if camera[0] > 0.5:
         return x * camera[1] + camera[3], y * camera[2] + camera[4]
-    return x / z * camera[1] + camera[3], y / z * camera[2] + camera[4]
+    near = 1.0 / z
+    return x * near * camera[1] + camera[3], y * near * camera[2] + camera[4]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def pixels_per_metre(z, camera):
     """How many pixels a metre across the view covers at depth z [m]."""
     return camera[1] if camera[0] > 0.5 else camera[1] / z
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def ray_at(x, y, z, camera):
     """Unit direction of the sensor's look at a point."""
     if camera[0] > 0.5:
         return 0.0, 0.0, 1.0
-    length = np.sqrt(x * x + y * y + z * z)
-    return x / length, y / length, z / length
+    near = 1.0 / np.sqrt(x * x + y * y + z * z)
+    return x * near, y * near, z * near
 
 
-@njit(cache=True)
-def nearest_edge(x, y, z, ax, ay, az, evidence):
+@njit(cache=True, error_model="numpy", inline="always")
+def sector_of(du, dv):
+    """Number of the sector that a direction in the image lies in, either way along it."""
+    if dv < 0.0:
+        du, dv = -du, -dv
+    flat = abs(du)
+    sector = 0 if dv < TAN_15 * flat else 1 if dv < flat else 2 if TAN_15 * dv < flat else 3
+    return DIRECTIONS - sector if du < 0.0 and sector > 0 else sector
+
+
+@njit(cache=True, error_model="numpy")
+def nearest_edge(x, y, z, ax, ay, az, nearest, edges, camera, pixel):
     """Number of the nearest edge pixel of about the direction that (ax, ay, az) has in the image at a point, −1 for none, and its
     distance [m] sideways."""
-    u, v = project(x, y, z, evidence.camera)
-    step = 0.5 * evidence.pixel
-    u2, v2 = project(x + step * ax, y + step * ay, z + step * az, evidence.camera)
+    u, v = project(x, y, z, camera)
     i, j = int(np.rint(u)), int(np.rint(v))
-    if i < 0 or j < 0 or i >= evidence.depth.shape[1] or j >= evidence.depth.shape[0]:
+    if i < 0 or j < 0 or i >= nearest.shape[2] or j >= nearest.shape[1]:
         return -1, np.inf
-    sector = int(np.rint(np.arctan2(v2 - v, u2 - u) / SECTOR)) % DIRECTIONS
-    k = evidence.nearest[sector, j, i]
+    step = 0.5 * pixel
+    u2, v2 = project(x + step * ax, y + step * ay, z + step * az, camera)
+    k = nearest[sector_of(u2 - u, v2 - v), j, i]
     if k < 0:
         return -1, np.inf
-    du, dv = evidence.edge_uv[k, 0] - u, evidence.edge_uv[k, 1] - v
-    return k, np.sqrt(du * du + dv * dv) / pixels_per_metre(z, evidence.camera)
+    du, dv = edges[k, U] - u, edges[k, V] - v
+    return k, np.sqrt(du * du + dv * dv) / pixels_per_metre(z, camera)

@@ -16,10 +16,10 @@ from handey_studio.localization.evidence import Evidence, Limits
 from handey_studio.localization.pairs import model_edges
 from handey_studio.localization.render import rendered_depth
 from handey_studio.localization.result import LocateOptions
-from handey_studio.localization.samples import PartSamples, part_samples
+from handey_studio.localization.samples import ALONG, PartSamples, part_samples
 from handey_studio.localization.search import Search, look
 from handey_studio.localization.segments import DataEdge
-from handey_studio.localization.verify import GRAZING, MIN_EDGE_SHARE, MIN_VISIBLE_SHARE, edge_state, verify
+from handey_studio.localization.verify import GRAZING, MIN_EDGE_SHARE, MIN_VISIBLE_SHARE, edge_states, verify
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world.part import Part
 
@@ -87,7 +87,7 @@ def explain(
     search = search or look(view, LocateOptions())
     samples, evidence, limits = part_samples(part), search.evidence, search.limits
     R, t = np.ascontiguousarray(T_sensor_part[:3, :3]), np.ascontiguousarray(T_sensor_part[:3, 3])
-    states = _edge_states(R, t, samples, evidence, limits)
+    states = edge_states(R, t, samples, evidence, limits)
     pieces, state, edge = _pieces(samples, _shown(states))
     readings, distance = _residuals(view, part, T_sensor_part, evidence, limits)
     agree = distance[np.abs(distance) <= limits.agree]
@@ -121,7 +121,7 @@ def _pieces(samples: PartSamples, shown: NDArray) -> tuple[NDArray, NDArray, NDA
     begins = np.r_[True, (np.diff(samples.edge) != 0) | (np.diff(shown) != 0)]
     first = np.nonzero(begins)[0]
     last = np.r_[first[1:], len(shown)] - 1
-    reach = 0.5 * samples.edge_weight[:, None] * samples.along
+    reach = 0.5 * samples.edge_weight[:, None] * samples.directions[samples.edge, ALONG]
     ends = np.stack([samples.edge_point[first] - reach[first], samples.edge_point[last] + reach[last]], axis=1)
     return ends, shown[first], samples.edge[first]
 
@@ -170,15 +170,6 @@ def _pairs(
         return None, posed
     ends = np.array([edge.ends_world for edge in data])
     return edge_pair(ends, None if posed is None else posed.directions), posed
-
-
-@njit(cache=True)
-def _edge_states(R, t, samples, evidence, limits):
-    """What the verifier says of each edge sample."""
-    states = np.empty(len(samples.edge), dtype=np.int64)
-    for k in range(len(states)):
-        states[k] = edge_state(R, t, k, samples, evidence, limits)[0]
-    return states
 
 
 @njit(cache=True)

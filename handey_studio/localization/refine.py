@@ -12,9 +12,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.edges import JUMP
-from handey_studio.localization.evidence import Evidence, Limits, ray_at
-from handey_studio.localization.samples import PartSamples
-from handey_studio.localization.verify import GRAZING, ON, _dot, edge_state, facing, reading_at
+from handey_studio.localization.evidence import KIND, Evidence, Limits, X, Y, Z, ray_at
+from handey_studio.localization.samples import ALONG, INTO_LEFT, INTO_RIGHT, PartSamples
+from handey_studio.localization.verify import GRAZING, ON, edge_state, facing, placed, reading_at, turned
 from handey_studio.sensing.depth_view import DepthView
 
 TAPERING = 0.5  # limits shrink to this share over the iterations
@@ -59,7 +59,7 @@ def refine(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, lim
     return Refined(*_refine(np.array(R), np.array(t), samples, evidence, limits, weights, iterations))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _add(A, g, row, residual, sigma):
     """One observation, weighted down the farther it is off (Cauchy), into the normal equations."""
     scaled = residual / sigma
@@ -70,7 +70,7 @@ def _add(A, g, row, residual, sigma):
             A[r, c] += weight * row[r] * row[c]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", inline="always")
 def _row(row, mx, my, mz, px, py, pz):
     """Derivative of m · (turn × p + shift) by the turn and the shift."""
     row[0], row[1], row[2] = py * mz - pz * my, pz * mx - px * mz, px * my - py * mx
@@ -78,74 +78,106 @@ def _row(row, mx, my, mz, px, py, pz):
     row[6] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _faces(R, t, samples, evidence, limits, sigma, A, g):
     """Readings to the planes of the faces that they lie on; (sum of squares, count)."""
-    row = np.zeros(7)
+    row, normals = np.zeros(7), turned(R, samples.normal)
+    points, faces, depth, camera = samples.face_point, samples.face, evidence.depth, evidence.camera
     squares, count = 0.0, 0
-    for k in range(len(samples.face_weight)):
-        p, normal = samples.face_point[k], samples.face_normal[k]
-        px, py, pz = _dot(R, 0, p), _dot(R, 1, p), _dot(R, 2, p)
-        x, y, z = px + t[0], py + t[1], pz + t[2]
-        cosine = facing(R, normal, x, y, z, evidence.camera)
+    for k in range(len(faces)):
+        x, y, z = placed(R, t, points, k)
+        face = faces[k]
+        cosine = facing(normals[face, 0], normals[face, 1], normals[face, 2], x, y, z, camera)
         if cosine < GRAZING:
             continue
-        seen, behind = reading_at(x, y, z, evidence, limits)
+        seen, behind = reading_at(x, y, z, depth, camera, limits)
         if seen != ON:
             continue
-        rz = ray_at(x, y, z, evidence.camera)[2]
-        residual = -behind / rz * cosine  # of the reading from the face, along its outward normal
-        _row(row, _dot(R, 0, normal), _dot(R, 1, normal), _dot(R, 2, normal), px, py, pz)
+        residual = -behind / ray_at(x, y, z, camera)[2] * cosine  # of the reading from the face, along its outward normal
+        _row(row, normals[face, 0], normals[face, 1], normals[face, 2], x - t[0], y - t[1], z - t[2])
         _add(A, g, row, residual, sigma)
         squares += residual * residual
         count += 1
     return squares, count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _outlines(R, t, margin, samples, evidence, limits, sigma, A, g):
     """Edge pixels to the visible edges, across both the edge and the line of sight; silhouettes less the margin."""
-    row = np.zeros(7)
-    for k in range(len(samples.edge)):
-        state, e = edge_state(R, t, k, samples, evidence, limits)
+    row, posed = np.zeros(7), turned(R, samples.directions)
+    points, edge_of, concave = samples.edge_point, samples.edge, samples.concave
+    depth, nearest, edges, camera, pixel = evidence
+    for k in range(len(edge_of)):
+        x, y, z = placed(R, t, points, k)
+        e = edge_of[k]
+        state, found, _, left, right = edge_state(x, y, z, posed, e, concave[e], depth, nearest, edges, camera, pixel, limits)
         if state != 1:
             continue
-        p, a = samples.edge_point[k], samples.along[k]
-        px, py, pz = _dot(R, 0, p), _dot(R, 1, p), _dot(R, 2, p)
-        x, y, z = px + t[0], py + t[1], pz + t[2]
-        rx, ry, rz = ray_at(x, y, z, evidence.camera)
-        ax, ay, az = _dot(R, 0, a), _dot(R, 1, a), _dot(R, 2, a)
+        rx, ry, rz = ray_at(x, y, z, camera)
+        ax, ay, az = posed[e, ALONG, 0], posed[e, ALONG, 1], posed[e, ALONG, 2]
         mx, my, mz = ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
         length = np.sqrt(mx * mx + my * my + mz * mz)
         if length < 0.2:
             continue
-        left = facing(R, samples.left[k], x, y, z, evidence.camera) > GRAZING
-        right = facing(R, samples.right[k], x, y, z, evidence.camera) > GRAZING
-        into = samples.into_left[k] if left else samples.into_right[k]
-        outwards = -(mx * _dot(R, 0, into) + my * _dot(R, 1, into) + mz * _dot(R, 2, into))
+        into = INTO_LEFT if left else INTO_RIGHT
+        outwards = -(mx * posed[e, into, 0] + my * posed[e, into, 1] + mz * posed[e, into, 2])
         sign = (1.0 if outwards > 0 else -1.0) / length
         mx, my, mz = sign * mx, sign * my, sign * mz
-        q = evidence.edge_point[e]
-        depth = z / q[2] if evidence.camera[0] < 0.5 else 1.0  # along the pixel's ray to the outline's depth
-        residual = mx * (q[0] * depth - x) + my * (q[1] * depth - y)
-        _row(row, mx, my, mz, px, py, pz)
-        if (left != right) and evidence.edge_kind[e] == JUMP:
+        qx, qy, qz = edges[found, X], edges[found, Y], edges[found, Z]
+        share = z / qz if camera[0] < 0.5 else 1.0  # along the pixel's ray to the outline's depth
+        residual = mx * (qx * share - x) + my * (qy * share - y)
+        _row(row, mx, my, mz, x - t[0], y - t[1], z - t[2])
+        if (left != right) and edges[found, KIND] == JUMP:
             residual += margin
             row[6] = -1.0
         _add(A, g, row, residual, sigma)
 
 
-@njit(cache=True)
-def _turned(R, w):
+@njit(cache=True, error_model="numpy")
+def _turned_by(R, w):
     """R after a small turn by the rotation vector w, exactly orthonormal (Rodrigues)."""
     angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    K = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
     a = np.sin(angle) / angle if angle > 1e-9 else 1.0
     b = (1.0 - np.cos(angle)) / (angle * angle) if angle > 1e-9 else 0.5
-    return (np.eye(3) + a * K + b * (K @ K)) @ R
+    out = np.empty((3, 3))
+    for c in range(3):
+        x, y, z = R[0, c], R[1, c], R[2, c]
+        kx, ky, kz = w[1] * z - w[2] * y, w[2] * x - w[0] * z, w[0] * y - w[1] * x
+        out[0, c] = x + a * kx + b * (w[1] * kz - w[2] * ky)
+        out[1, c] = y + a * ky + b * (w[2] * kx - w[0] * kz)
+        out[2, c] = z + a * kz + b * (w[0] * ky - w[1] * kx)
+    return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _factored(A):
+    """The Cholesky factor L (n, n) of a positive definite matrix, of which the lower half is read."""
+    L = np.zeros_like(A)
+    for r in range(len(A)):
+        for c in range(r + 1):
+            rest = A[r, c]
+            for k in range(c):
+                rest -= L[r, k] * L[c, k]
+            L[r, c] = np.sqrt(rest) if r == c else rest / L[c, c]
+    return L
+
+
+@njit(cache=True, error_model="numpy")
+def _solved(L, g):
+    """x with L Lᵀ x = g."""
+    x = g.copy()
+    for r in range(len(x)):
+        for k in range(r):
+            x[r] -= L[r, k] * x[k]
+        x[r] /= L[r, r]
+    for r in range(len(x) - 1, -1, -1):
+        for k in range(r + 1, len(x)):
+            x[r] -= L[k, r] * x[k]
+        x[r] /= L[r, r]
+    return x
+
+
+@njit(cache=True, error_model="numpy")
 def _normal_equations(R, t, margin, samples, evidence, limits, weights):
     """A (7, 7), g (7,) of one step, with the margin's expectation as an observation; sum of squares and count of the faces' readings."""
     A, g = np.zeros((7, 7)), np.zeros(7)
@@ -155,13 +187,11 @@ def _normal_equations(R, t, margin, samples, evidence, limits, weights):
     A[6, 6] += strength
     g[6] += strength * (weights.margin - margin)
     for r in range(7):
-        for c in range(r):
-            A[c, r] = A[r, c]
         A[r, r] += 1e-6 * A[r, r] + 1e-3  # what nothing fixes stays where it is
     return A, g, squares, count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _refine(R, t, samples, evidence, limits, weights, iterations):
     margins, rms = np.full(len(t), weights.margin), np.full(len(t), np.inf)
     covariance = np.zeros((len(t), 6, 6))
@@ -173,16 +203,18 @@ def _refine(R, t, samples, evidence, limits, weights, iterations):
             if count < 6:
                 break
             rms[n] = np.sqrt(squares / count)
-            delta = np.linalg.solve(A, g)
+            L = _factored(A)
+            delta = _solved(L, g)
             turn = np.sqrt(delta[0] ** 2 + delta[1] ** 2 + delta[2] ** 2)
             shift = np.sqrt(delta[3] ** 2 + delta[4] ** 2 + delta[5] ** 2)
             still = step >= iterations // 2 and turn < STILL_RAD and shift < STILL * weights.face
             if step == iterations - 1 or still:
-                covariance[n] = np.linalg.inv(A)[:6, :6]
+                for c in range(6):
+                    covariance[n, c] = _solved(L, np.eye(7)[c])[:6]
                 break
             if turn > MAX_TURN:
                 delta *= MAX_TURN / turn
-            R[n] = _turned(R[n], delta[:3])
+            R[n] = _turned_by(R[n], delta[:3])
             t[n] += delta[3:6]
             margins[n] = max(margins[n] + delta[6], 0.0)
     return R, t, margins, rms, covariance

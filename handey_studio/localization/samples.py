@@ -15,30 +15,29 @@ DENSER = 6  # times as many for the last refinement, which averages the noise of
 THINNING = 5
 MIN_PER_EDGE = 4
 MIN_PER_FACE = 12
+ALONG, LEFT, RIGHT, INTO_LEFT, INTO_RIGHT = range(5)  # directions of an edge
 
 
 class PartSamples(NamedTuple):
     """Points on a part, in its frame [m].
 
-    Edges: `edge_point` (n, 3), its number `edge` (n,) in the table of model edges, unit `along`, normals `left`, `right`
-    (n, 3), directions `into_left`, `into_right` (n, 3) from the edge into its faces, and `edge_weight` (n,) [m], the
-    length it stands for; whether it is `concave` (n,). Faces: `face_point`, `face_normal` (m, 3) `face_weight` (m,) [m²]
-    and `face_rim` (m,) [m], how far it is from the nearest edge.
+    Edges: `edge_point` (n, 3), its number `edge` (n,) in the table of model edges, and `edge_weight` (n,) [m], the length it stands
+    for. Of each model edge the unit `directions` (e, 5, 3): ALONG it, outward normals of the faces LEFT and RIGHT of it, INTO_LEFT and
+    INTO_RIGHT from the edge into its faces; whether it is `concave` (e,). Faces: `face_point` (m, 3), its number `face` (m,) among the
+    part's faces, `face_weight` (m,) [m²], and `face_rim` (m,) [m], how far it is from the nearest edge; the outward `normal` (f, 3)
+    of each face.
     """
 
     edge_point: NDArray
     edge: NDArray
-    along: NDArray
-    left: NDArray
-    right: NDArray
-    into_left: NDArray
-    into_right: NDArray
     edge_weight: NDArray
+    directions: NDArray
     concave: NDArray
     face_point: NDArray
-    face_normal: NDArray
+    face: NDArray
     face_weight: NDArray
     face_rim: NDArray
+    normal: NDArray
 
 
 @lru_cache(maxsize=64)
@@ -49,21 +48,25 @@ def part_samples(part: Part, density: int = 1) -> PartSamples:
     counts = np.maximum(np.rint(2.0 * edges.half / spacing).astype(int), MIN_PER_EDGE)
     number = np.repeat(np.arange(len(counts)), counts)
     place = np.concatenate([(np.arange(n) + 0.5) / n * 2.0 - 1.0 for n in counts])
-    along, left, right = edges.direction[number], edges.left[number], edges.right[number]
-    points = edges.middle[number] + (place * edges.half[number])[:, None] * along
+    points = edges.middle[number] + (place * edges.half[number])[:, None] * edges.direction[number]
     weight = (2.0 * edges.half / counts)[number]
-    face_point, face_normal, face_weight = _face_samples(part, density * FACE_SAMPLES)
-    into_left, into_right = np.cross(left, along), -np.cross(right, along)
-    rim = _distance_to_edges(face_point, edges)
-    return PartSamples(
-        points, number, along, left, right, into_left, into_right, weight, edges.concave[number], face_point, face_normal, face_weight, rim
-    )
+    face_point, face, face_weight = _face_samples(part, density * FACE_SAMPLES)
+    rim, normals = _distance_to_edges(face_point, edges), np.array(part.solid.normals)
+    return PartSamples(points, number, weight, _directions(edges), edges.concave, face_point, face, face_weight, rim, normals)
+
+
+def _directions(edges: ModelEdges) -> NDArray:
+    """(e, 5, 3) as in `PartSamples`."""
+    into_left, into_right = np.cross(edges.left, edges.direction), -np.cross(edges.right, edges.direction)
+    return np.stack([edges.direction, edges.left, edges.right, into_left, into_right], axis=1)
 
 
 @lru_cache(maxsize=64)
 def thinned(part: Part) -> PartSamples:
     """One in `THINNING` of a part's samples, for a first refinement."""
-    return PartSamples(*(np.ascontiguousarray(array[::THINNING]) for array in part_samples(part)))
+    samples = part_samples(part)
+    of_points = ("edge_point", "edge", "edge_weight", "face_point", "face", "face_weight", "face_rim")
+    return samples._replace(**{key: np.ascontiguousarray(getattr(samples, key)[::THINNING]) for key in of_points})
 
 
 def _distance_to_edges(points: NDArray, edges: ModelEdges) -> NDArray:
@@ -74,9 +77,9 @@ def _distance_to_edges(points: NDArray, edges: ModelEdges) -> NDArray:
 
 
 def _face_samples(part: Part, wanted: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Points on the faces from a low-discrepancy sequence over each triangle, with the area that each stands for."""
+    """Points on the faces from a low-discrepancy sequence over each triangle, their faces, and the area that each stands for."""
     solid = part.solid
-    points, normals, weights = [], [], []
+    points, faces, weights = [], [], []
     total = sum(_area(solid.vertices[t]) for f in range(len(solid.faces)) for t in solid.face_triangles(f))
     for f in range(len(solid.faces)):
         triangles = solid.vertices[solid.face_triangles(f)]
@@ -84,9 +87,9 @@ def _face_samples(part: Part, wanted: int) -> tuple[NDArray, NDArray, NDArray]:
         for corners, area in zip(triangles, areas, strict=True):
             n = max(round(wanted * area / total), int(np.ceil(MIN_PER_FACE * area / areas.sum())))
             points.append(_spread(corners, n))
-            normals.append(np.repeat(solid.normals[f][None], n, axis=0))
+            faces.append(np.full(n, f))
             weights.append(np.full(n, area / n))
-    return np.concatenate(points), np.concatenate(normals), np.concatenate(weights)
+    return np.concatenate(points), np.concatenate(faces), np.concatenate(weights)
 
 
 def _area(corners: NDArray) -> float:

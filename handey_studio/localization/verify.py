@@ -11,8 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.edges import CONVEX
-from handey_studio.localization.evidence import Evidence, Limits, nearest_edge, pixels_per_metre, project, ray_at
-from handey_studio.localization.samples import PartSamples
+from handey_studio.localization.evidence import KIND, Evidence, Limits, U, V, Z, nearest_edge, pixels_per_metre, project, ray_at
+from handey_studio.localization.samples import ALONG, INTO_LEFT, INTO_RIGHT, LEFT, RIGHT, PartSamples
 
 ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
 GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on
@@ -89,14 +89,14 @@ def unopposed(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, 
     return np.nonzero(_unopposed(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits))[0]
 
 
-@njit(cache=True)
-def reading_at(x, y, z, evidence, limits):
+@njit(cache=True, error_model="numpy")
+def reading_at(x, y, z, depth, camera, limits):
     """How the reading at a point's pixel stands to it (ON, HIDDEN, THROUGH, UNKNOWN), and how far behind it [m]."""
-    u, v = project(x, y, z, evidence.camera)
+    u, v = project(x, y, z, camera)
     i, j = int(np.rint(u)), int(np.rint(v))
-    if z <= 0.0 or i < 0 or j < 0 or i >= evidence.depth.shape[1] or j >= evidence.depth.shape[0]:
+    if z <= 0.0 or i < 0 or j < 0 or i >= depth.shape[1] or j >= depth.shape[0]:
         return UNKNOWN, 0.0
-    behind = evidence.depth[j, i] - z
+    behind = depth[j, i] - z
     if np.isnan(behind):
         return UNKNOWN, 0.0
     if behind < -limits.hide:
@@ -109,94 +109,123 @@ def _dot(R, r, w):
     return R[r, 0] * w[0] + R[r, 1] * w[1] + R[r, 2] * w[2]
 
 
-@njit(cache=True)
-def facing(R, normal, x, y, z, camera):
+@njit(cache=True, error_model="numpy", inline="always")
+def placed(R, t, points, k):
+    """Point number k of a part at a pose."""
+    x, y, z = points[k, 0], points[k, 1], points[k, 2]
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + t[0],
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + t[1],
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + t[2],
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def turned(R, directions):
+    """Directions (..., 3) of a part at a pose."""
+    out = np.empty_like(directions)
+    flat, into = directions.reshape(-1, 3), out.reshape(-1, 3)
+    for k in range(len(flat)):
+        for r in range(3):
+            into[k, r] = R[r, 0] * flat[k, 0] + R[r, 1] * flat[k, 1] + R[r, 2] * flat[k, 2]
+    return out
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def facing(nx, ny, nz, x, y, z, camera):
     """Cosine between a face's outward normal and the way back to the sensor, at a point of it."""
     rx, ry, rz = ray_at(x, y, z, camera)
-    return -(_dot(R, 0, normal) * rx + _dot(R, 1, normal) * ry + _dot(R, 2, normal) * rz)
+    return -(nx * rx + ny * ry + nz * rz)
 
 
-@njit(cache=True)
-def edge_state(R, t, k, samples, evidence, limits):
-    """One edge sample at a pose: 1 found, 2 no edge pixel but the surface ends there, 0 visible but missing, −1 not to be seen.
-    Then the edge pixel that was found, or −1."""
-    p = samples.edge_point[k]
-    x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
-    inset = limits.edge + evidence.pixel
-    state, flanks = -1, 0
-    ix = iy = iz = 0.0
-    for flank in range(2):
-        normal = samples.left[k] if flank == 0 else samples.right[k]
-        if facing(R, normal, x, y, z, evidence.camera) < GRAZING:
-            continue
-        into = samples.into_left[k] if flank == 0 else samples.into_right[k]
-        ix, iy, iz = _dot(R, 0, into), _dot(R, 1, into), _dot(R, 2, into)
-        flanks += 1
-        seen = reading_at(x + inset * ix, y + inset * iy, z + inset * iz, evidence, limits)[0]
-        if seen in (ON, THROUGH):
-            state = 0
-    if state < 0:
-        return -1, -1
-    a = samples.along[k]
-    edge, sideways = nearest_edge(x, y, z, _dot(R, 0, a), _dot(R, 1, a), _dot(R, 2, a), evidence)
-    close = edge >= 0 and sideways <= limits.edge + 0.7 * evidence.pixel and abs(evidence.edge_point[edge, 2] - z) <= limits.edge_depth
-    if flanks == 2:
-        return (1, edge) if close else (0, -1)
+@njit(cache=True, error_model="numpy", inline="always")
+def vector(directions, e, which):
+    """One of the directions of edge number e."""
+    return directions[e, which, 0], directions[e, which, 1], directions[e, which, 2]
+
+
+@njit(cache=True, error_model="numpy")
+def edge_state(x, y, z, directions, e, concave, depth, nearest, edges, camera, pixel, limits):
+    """One edge sample at a place, of edge number e with `directions` (e, 5, 3) there: 1 found, 2 no edge pixel but the surface ends
+    there, 0 visible but missing, −1 not to be seen. Then the edge pixel that was found, or −1, how far [m] it lies inwards, and
+    whether the faces left and right of the edge look at the sensor."""
+    nx, ny, nz = vector(directions, e, LEFT)
+    left = facing(nx, ny, nz, x, y, z, camera) >= GRAZING
+    nx, ny, nz = vector(directions, e, RIGHT)
+    right = facing(nx, ny, nz, x, y, z, camera) >= GRAZING
+    inset, in_sight = limits.edge + pixel, False
+    for side in range(INTO_LEFT if left else INTO_RIGHT, INTO_RIGHT + 1 if right else INTO_RIGHT):
+        ix, iy, iz = vector(directions, e, side)
+        seen, _ = reading_at(x + inset * ix, y + inset * iy, z + inset * iz, depth, camera, limits)
+        in_sight = in_sight or seen in (ON, THROUGH)
+    if not in_sight:
+        return -1, -1, 0.0, left, right
+    ax, ay, az = vector(directions, e, ALONG)
+    k, sideways = nearest_edge(x, y, z, ax, ay, az, nearest, edges, camera, pixel)
+    close = k >= 0 and sideways <= limits.edge + 0.7 * pixel and abs(edges[k, Z] - z) <= limits.edge_depth
+    ix, iy, iz = vector(directions, e, INTO_LEFT if left else INTO_RIGHT)
+    off = inwards(x, y, z, ax, ay, az, ix, iy, iz, edges[k, U], edges[k, V], camera, pixel) if close else 0.0
+    if left and right:
+        return (1, k, off, left, right) if close else (0, -1, 0.0, left, right)
     # a silhouette: sensors lose readings there, they do not add any, and a surface that bends away in sight is none
-    if close and evidence.edge_kind[edge] != CONVEX and inwards(R, t, k, edge, samples, evidence) >= -limits.outside - 0.7 * evidence.pixel:
-        return 1, edge
-    beyond = limits.outside + evidence.pixel
-    seen = reading_at(x - beyond * ix, y - beyond * iy, z - beyond * iz, evidence, limits)[0]
+    if close and edges[k, KIND] != CONVEX and off >= -limits.outside - 0.7 * pixel:
+        return 1, k, off, left, right
+    beyond = limits.outside + pixel
+    seen, _ = reading_at(x - beyond * ix, y - beyond * iy, z - beyond * iz, depth, camera, limits)
     if seen == HIDDEN:
-        return (2 if samples.concave[k] else -1), -1  # at a concave edge the part's own wall rises
-    return (0 if seen == ON else 2), -1
+        return (2 if concave else -1), -1, 0.0, left, right  # at a concave edge the part's own wall rises
+    return (0 if seen == ON else 2), -1, 0.0, left, right
 
 
-@njit(cache=True)
-def crease_in_sight(R, t, k, samples, evidence):
-    """Whether both faces beside an edge sample look at the sensor."""
-    p = samples.edge_point[k]
-    x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
-    left, right = samples.left[k], samples.right[k]
-    return facing(R, left, x, y, z, evidence.camera) >= GRAZING and facing(R, right, x, y, z, evidence.camera) >= GRAZING
-
-
-@njit(cache=True)
-def inwards(R, t, k, edge, samples, evidence):
-    """How far [m] an edge pixel lies from an edge sample across the edge in the image, positive towards the face that is seen."""
-    p, a = samples.edge_point[k], samples.along[k]
-    x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
-    into = samples.into_left[k] if facing(R, samples.left[k], x, y, z, evidence.camera) >= GRAZING else samples.into_right[k]
-    step = evidence.pixel
-    u, v = project(x, y, z, evidence.camera)
-    ua, va = project(x + step * _dot(R, 0, a), y + step * _dot(R, 1, a), z + step * _dot(R, 2, a), evidence.camera)
-    ui, vi = project(x + step * _dot(R, 0, into), y + step * _dot(R, 1, into), z + step * _dot(R, 2, into), evidence.camera)
+@njit(cache=True, error_model="numpy")
+def inwards(x, y, z, ax, ay, az, ix, iy, iz, u_pixel, v_pixel, camera, step):
+    """How far [m] an edge pixel lies from an edge sample across the edge (ax, ay, az) in the image, positive towards the face that is
+    seen, into which (ix, iy, iz) points."""
+    u, v = project(x, y, z, camera)
+    ua, va = project(x + step * ax, y + step * ay, z + step * az, camera)
+    ui, vi = project(x + step * ix, y + step * iy, z + step * iz, camera)
     nu, nv = va - v, u - ua
     length = np.sqrt(nu * nu + nv * nv) + 1e-12
     side = 1.0 if nu * (ui - u) + nv * (vi - v) > 0 else -1.0
-    off = (evidence.edge_uv[edge, 0] - u) * nu + (evidence.edge_uv[edge, 1] - v) * nv
-    return side * off / length / pixels_per_metre(z, evidence.camera)
+    off = (u_pixel - u) * nu + (v_pixel - v) * nv
+    return side * off / length / pixels_per_metre(z, camera)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def edge_states(R, t, samples, evidence, limits):
+    """What `edge_state` says of each edge sample at a pose (n,)."""
+    states, posed = np.empty(len(samples.edge), dtype=np.int64), turned(R, samples.directions)
+    depth, nearest, edges, camera, pixel = evidence
+    for k in range(len(states)):
+        e = samples.edge[k]
+        x, y, z = placed(R, t, samples.edge_point, k)
+        states[k] = edge_state(x, y, z, posed, e, samples.concave[e], depth, nearest, edges, camera, pixel, limits)[0]
+    return states
+
+
+@njit(cache=True, error_model="numpy")
 def _edges(R, t, samples, evidence, limits, offset, every, out):
     """Adds what one pose's edges say: `found` to `edges`, `scatter` and `unbent` of its verdict."""
+    points, edge, weights, concave = samples.edge_point, samples.edge, samples.edge_weight, samples.concave
+    posed = turned(R, samples.directions)
+    depth, nearest, edges, camera, pixel = evidence
     visible = found = samples_of_edge = matched = 0
     total = squares = 0.0
-    for k in range(offset, len(samples.edge), every):
-        state, edge = edge_state(R, t, k, samples, evidence, limits)
-        if edge >= 0:
-            off = inwards(R, t, k, edge, samples, evidence)
+    for k in range(offset, len(edge), every):
+        e = edge[k]
+        x, y, z = placed(R, t, points, k)
+        state, found_pixel, off, left, right = edge_state(x, y, z, posed, e, concave[e], depth, nearest, edges, camera, pixel, limits)
+        if found_pixel >= 0:
             total, squares, matched = total + off, squares + off * off, matched + 1
-        weight = samples.edge_weight[k]
+        weight = weights[k]
         if state == 2:
             out[0] += ENDS_WORTH * weight
         elif state >= 0:
             out[1 - state] += weight
-            if state == 0 and crease_in_sight(R, t, k, samples, evidence):
+            if state == 0 and left and right:
                 out[9] += weight
         visible, found, samples_of_edge = visible + (state >= 0), found + (state >= 1), samples_of_edge + 1
-        if k + every >= len(samples.edge) or samples.edge[k + every] != samples.edge[k]:
+        if k + every >= len(edge) or edge[k + every] != e:
             if visible >= 2 and visible >= MIN_VISIBLE_SHARE * samples_of_edge:
                 out[6] += 1.0
                 out[7] += found >= MIN_EDGE_SHARE * visible
@@ -205,51 +234,55 @@ def _edges(R, t, samples, evidence, limits, offset, every, out):
         out[8] = np.sqrt(max(squares / matched - (total / matched) ** 2, 0.0))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _surfaces(R, t, samples, evidence, limits, offset, every, out):
     """Adds what one pose's faces say: the square metres on readings, seen through, hidden and without a reading, and `lifted`."""
-    total, count = 0.0, 0
-    for k in range(offset, len(samples.face_weight), every):
-        p, normal = samples.face_point[k], samples.face_normal[k]
-        last = k - every
-        if last >= 0 and (samples.face_normal[last] != normal).any():
+    points, faces, weights, rims = samples.face_point, samples.face, samples.face_weight, samples.face_rim
+    normals = turned(R, samples.normal)
+    depth, camera, pixel = evidence.depth, evidence.camera, evidence.pixel
+    total, count, before = 0.0, 0, -1
+    for k in range(offset, len(faces), every):
+        face = faces[k]
+        if face != before:
             out[10] = max(out[10], abs(total) / count if count >= MIN_OF_ONE else 0.0)
-            total, count = 0.0, 0
-        x, y, z = _dot(R, 0, p) + t[0], _dot(R, 1, p) + t[1], _dot(R, 2, p) + t[2]
-        cosine = facing(R, normal, x, y, z, evidence.camera)
+            total, count, before = 0.0, 0, face
+        x, y, z = placed(R, t, points, k)
+        cosine = facing(normals[face, 0], normals[face, 1], normals[face, 2], x, y, z, camera)
         if cosine < GRAZING:
             continue
-        seen, behind = reading_at(x, y, z, evidence, limits)
-        rim = samples.face_rim[k] * cosine < limits.edge + 0.5 * evidence.pixel
+        seen, behind = reading_at(x, y, z, depth, camera, limits)
+        rim = rims[k] * cosine < limits.edge + 0.5 * pixel
         if rim and seen in (THROUGH, UNKNOWN):
             continue  # the margin that sensors lose at silhouettes
         if seen == UNKNOWN and cosine < STEEP:
             seen = HIDDEN  # too steep to blame the part for the missing reading
         if seen == ON:
-            total, count = total + behind * cosine / ray_at(x, y, z, evidence.camera)[2], count + 1
-        out[2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += samples.face_weight[k]
+            total, count = total + behind * cosine / ray_at(x, y, z, camera)[2], count + 1
+        out[2 if seen == ON else 3 if seen == THROUGH else 4 if seen == HIDDEN else 5] += weights[k]
     out[10] = max(out[10], abs(total) / count if count >= MIN_OF_ONE else 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _unopposed(R, t, samples, evidence, limits):
+    points, faces, rims, depth, camera = samples.face_point, samples.face, samples.face_rim, evidence.depth, evidence.camera
     good = np.zeros(len(t), dtype=np.bool_)
-    step = max(1, len(samples.face_weight) // GLANCE)
+    step = max(1, len(faces) // GLANCE)
     for n in range(len(t)):
+        normals = turned(R[n], samples.normal)
         on = through = 0
-        for k in range(n % step, len(samples.face_weight), step):
-            p = samples.face_point[k]
-            x, y, z = _dot(R[n], 0, p) + t[n, 0], _dot(R[n], 1, p) + t[n, 1], _dot(R[n], 2, p) + t[n, 2]
-            cosine = facing(R[n], samples.face_normal[k], x, y, z, evidence.camera)
-            if cosine < GRAZING or samples.face_rim[k] * cosine < limits.edge:
+        for k in range(n % step, len(faces), step):
+            face = faces[k]
+            x, y, z = placed(R[n], t[n], points, k)
+            cosine = facing(normals[face, 0], normals[face, 1], normals[face, 2], x, y, z, camera)
+            if cosine < GRAZING or rims[k] * cosine < limits.edge:
                 continue
-            seen, _ = reading_at(x, y, z, evidence, limits)
+            seen, _ = reading_at(x, y, z, depth, camera, limits)
             on, through = on + (seen == ON), through + (seen == THROUGH)
         good[n] = on > 0 and through <= MAX_THROUGH * (on + through)
     return good
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _verify(R, t, samples, evidence, limits, every):
     out = np.zeros((len(t), 11))
     for n in range(len(t)):
