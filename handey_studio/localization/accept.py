@@ -1,9 +1,11 @@
-"""Accept: what is probable by itself, then what explains the view jointly, refined once more from all that is seen."""
+"""Accept: what is probable by itself, then what explains the view jointly."""
 
 import time
 from typing import NamedTuple
 
-from handey_studio.localization.candidates import Candidate, polished
+import numpy as np
+
+from handey_studio.localization.candidates import Candidate
 from handey_studio.localization.joint import explain_jointly
 from handey_studio.localization.result import Hypothesis, LocatedPose, pose_matrix
 from handey_studio.localization.search import Search
@@ -24,14 +26,7 @@ def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPos
     """The poses that stand, most probable first, and every candidate with why it fell: the accepted first, then by probability."""
     start = time.perf_counter()
     falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _objection(search, candidate)) is not None}
-    accepted = []
-    for n in _jointly(search, candidates, falls):
-        candidate = polished(search, candidates[n])
-        fall = _objection(search, candidate)
-        if fall is None:
-            accepted.append(candidate)
-        else:
-            falls[n] = fall
+    accepted = [candidates[n] for n in _jointly(search, candidates, falls)]
     for n, fall in sorted(falls.items()):
         search.ledger.fall(candidates[n].entry, fall.reason, value=fall.value, limit=fall.limit, unit=fall.unit)
     rejected = sorted(falls, key=lambda n: -candidates[n].score.probability)
@@ -47,7 +42,8 @@ def _jointly(search: Search, candidates: list[Candidate], falls: dict[int, Fall]
     ranked = sorted((n for n in range(len(candidates)) if n not in falls), key=lambda n: -candidates[n].score.probability)
     falls.update({n: Fall("too many better poses", k, MOST_RIVALS, "") for k, n in enumerate(ranked) if k >= MOST_RIVALS})
     standing = ranked[:MOST_RIVALS]
-    worth = [candidates[n].score.probability * float(candidates[n].verdict.found[0]) for n in standing]
+    # How much more probable the view is with a pose than without any: of two that exclude each other the more probable one stands.
+    worth = [-float(np.log1p(-candidates[n].score.probability)) for n in standing]
     joint = explain_jointly(search, [candidates[n] for n in standing], worth)
     falls.update({standing[k]: Fall(*rivalry) for k, rivalry in joint.fell.items()})
     chosen = []

@@ -13,7 +13,8 @@ from handey_studio.localization.pairs import data_lines, data_pairs, data_parall
 from handey_studio.localization.refine import Refined, refine
 from handey_studio.localization.samples import DENSER, part_samples, thinned
 from handey_studio.localization.score import Rated, Score, scores
-from handey_studio.localization.search import Search, on_table
+from handey_studio.localization.search import Search, footing
+from handey_studio.localization.second_look import second_look
 from handey_studio.localization.verify import Verdict, unopposed, verify
 from handey_studio.world.part import Part
 
@@ -23,6 +24,7 @@ EVERY = 6  # samples that the first verification looks at: one in so many
 FIRST_STEPS, LAST_STEPS = 4, 8  # of refinement, with few samples over rough limits, and with all over tight ones
 MOST_A_PLACE = 20  # hypotheses refined of those whose middles lie together
 MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE = 40, 4
+MOST_POLISHED, POLISHED_FROM = 12, 0.01  # poses refined from all readings, and how probable they must be
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +71,8 @@ def candidates_of(search: Search, part: Part) -> list[Candidate]:
     kept = distinct(found.R, found.t, order, part, _apart(search, part), search.options.max_refined, MOST_A_PLACE)
     search.timing["verify"] += time.perf_counter() - start
     start = time.perf_counter()
-    refined, rated, kept = _refined(search, part, found.R[kept], found.t[kept], kept)
+    made = _refined(search, part, found.rows(kept))
     search.timing["refine"] += time.perf_counter() - start
-    made = _candidates(search, part, refined, rated, found.data[kept], found.model[kept])
     entries = [search.ledger.add("verify", f"{part.name} from {_origin(c.data)}", parent=parent) for c in made]
     return [replace(candidate, entry=entry) for candidate, entry in zip(made, entries, strict=True)]
 
@@ -82,23 +83,12 @@ def _origin(data: tuple[int, ...]) -> str:
 
 def _possible(search: Search, part: Part, found: Assignments) -> Assignments:
     """Those that a glance does not rule out."""
-    above = np.nonzero(on_table(search, part, found.R, found.t)[0] <= FAR_BELOW * search.slack)[0]
+    above = np.nonzero(~(footing(search, part, found.R, found.t)[:, 0] < -FAR_BELOW * search.slack))[0]
     search.fell["it would stand below the table"] += len(found.t) - len(above)
     found = found.rows(above)
     possible = unopposed(found.R, found.t, part_samples(part), search.evidence, search.rough)
     search.fell["the sensor sees through it"] += len(found.t) - len(possible)
     return found.rows(possible)
-
-
-def polished(search: Search, candidate: Candidate) -> Candidate:
-    """A candidate refined once more from many more readings, and verified again."""
-    part = candidate.part
-    refined = refine(
-        candidate.R[None], candidate.t[None], part_samples(part, DENSER), search.evidence, search.limits, search.weights, LAST_STEPS
-    )
-    rated = _rated(search, part, refined, verify(refined.R, refined.t, part_samples(part), search.evidence, search.limits))
-    new = _candidates(search, part, refined, rated, np.array([candidate.data]), np.array([candidate.model]))[0]
-    return replace(new, entry=candidate.entry)
 
 
 def _apart(search: Search, part: Part) -> float:
@@ -121,26 +111,42 @@ def _hypotheses(search: Search, part: Part) -> Assignments:
     return found._replace(data=numbers[found.data])
 
 
-def _refined(search: Search, part: Part, R: NDArray, t: NDArray, numbers: NDArray) -> tuple[Refined, Rated, NDArray]:
-    """Poses refined, those that met taken for one, the most probable refined again; how they rate, and their `numbers`."""
-    samples, few = part_samples(part), thinned(part)
-    first = refine(R, t, few, search.evidence, search.rough, search.weights, FIRST_STEPS)
-    rated = _rated(search, part, first, verify(first.R, first.t, few, search.evidence, search.limits))
-    order = np.argsort([-score.probability for score in scores(search, part, rated)], kind="stable")
-    kept = distinct(first.R, first.t, order, part, _apart(search, part), MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE)
+def _refined(search: Search, part: Part, found: Assignments) -> list[Candidate]:
+    """Poses refined, those that met taken for one, the most probable refined again, and of these the most probable polished."""
+    samples, few, apart = part_samples(part), thinned(part), _apart(search, part)
+    first = refine(found.R, found.t, few, search.evidence, search.rough, search.weights, FIRST_STEPS)
+    order = np.argsort(-verify(first.R, first.t, few, search.evidence, search.limits).support, kind="stable")
+    kept = distinct(first.R, first.t, order, part, apart, MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE)
     last = refine(first.R[kept], first.t[kept], samples, search.evidence, search.limits, search.weights, LAST_STEPS)
-    rated = _rated(search, part, last, verify(last.R, last.t, samples, search.evidence, search.limits))
-    order = np.argsort([-score.probability for score in scores(search, part, rated)], kind="stable")
-    best = distinct(last.R, last.t, order, part, _apart(search, part), len(kept))
-    return last.rows(best), rated.rows(best), numbers[kept[best]]
+    rated = rate(search, part, last, verify(last.R, last.t, samples, search.evidence, search.limits), look_again=True)
+    best = distinct(last.R, last.t, _order(search, part, rated), part, apart, len(kept))
+    made = _candidates(search, part, last.rows(best), rated.rows(best), found.rows(kept[best]))
+    worth_it = sum(candidate.score.probability > POLISHED_FROM for candidate in made[:MOST_POLISHED])
+    polished = _polished(search, part, last.rows(best[:worth_it]), found.rows(kept[best[:worth_it]]))
+    return sorted([*polished, *made[worth_it:]], key=lambda candidate: -candidate.score.probability)
 
 
-def _rated(search: Search, part: Part, refined: Refined, verdict: Verdict) -> Rated:
-    return Rated(verdict, refined.margin, refined.rms, *on_table(search, part, refined.R, refined.t))
+def _polished(search: Search, part: Part, refined: Refined, found: Assignments) -> list[Candidate]:
+    """Candidates from poses refined once more from many more readings, and verified again."""
+    dense = part_samples(part, DENSER)
+    last = refine(refined.R, refined.t, dense, search.evidence, search.limits, search.weights, LAST_STEPS)
+    verdict = verify(last.R, last.t, part_samples(part), search.evidence, search.limits)
+    return _candidates(search, part, last, rate(search, part, last, verdict, look_again=True), found)
 
 
-def _candidates(search: Search, part: Part, refined: Refined, rated: Rated, data: NDArray, model: NDArray) -> list[Candidate]:
+def _order(search: Search, part: Part, rated: Rated) -> NDArray:
+    """Numbers of poses, most probable first."""
+    return np.argsort([-score.probability for score in scores(search, part, rated)], kind="stable")
+
+
+def rate(search: Search, part: Part, refined: Refined, verdict: Verdict, look_again: bool = False) -> Rated:
+    """How refined poses of a part rate, given their verdict; with a second look if `look_again`."""
+    tally = second_look(part, refined.R, refined.t, search.evidence, search.view.noise) if look_again else None
     sigma = _loosest(part, refined.R, refined.covariance)
+    return Rated(verdict, refined.margin, refined.rms, sigma, footing(search, part, refined.R, refined.t), tally)
+
+
+def _candidates(search: Search, part: Part, refined: Refined, rated: Rated, found: Assignments) -> list[Candidate]:
     return [
         Candidate(
             part,
@@ -148,12 +154,12 @@ def _candidates(search: Search, part: Part, refined: Refined, rated: Rated, data
             refined.t[k],
             float(refined.margin[k]),
             float(refined.rms[k]),
-            float(sigma[k]),
+            float(rated.sigma[k]),
             float(rated.below[k]),
             rated.verdict.rows(np.array([k])),
             score,
-            tuple(dict.fromkeys(int(i) for i in data[k])),
-            tuple(dict.fromkeys(int(i) for i in model[k])),
+            tuple(dict.fromkeys(int(i) for i in found.data[k])),
+            tuple(dict.fromkeys(int(i) for i in found.model[k])),
         )
         for k, score in enumerate(scores(search, part, rated))
     ]

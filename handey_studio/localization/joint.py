@@ -49,7 +49,7 @@ def explain_jointly(search: Search, candidates: list[Candidate], worth: Sequence
     fell = {}
     for n in set(range(len(candidates))) - set(chosen):
         against = [rivals[min(n, k), max(n, k)] for k in chosen if (min(n, k), max(n, k)) in rivals]
-        fell[n] = against[0] if against else Rivalry("better poses take its place", worth[n], worth[chosen[0]], "m")
+        fell[n] = against[0] if against else Rivalry("better poses take its place", worth[n], worth[chosen[0]], "")
     return Explanation(chosen, fell)
 
 

@@ -12,39 +12,42 @@ def rendered_depth(corners_sensor: NDArray, triangles: NDArray, shape: tuple[int
 
     Corners must lie in front of the sensor; triangles that do not are left out.
     """
-    out = np.full(shape, np.nan)
-    _draw(np.ascontiguousarray(corners_sensor), np.ascontiguousarray(triangles), camera, 0, 0, out)
+    out, drawn = np.full(shape, np.nan), np.full(shape, -1)
+    draw(np.ascontiguousarray(corners_sensor), np.ascontiguousarray(triangles), camera, 0, 0, out, drawn)
     return out
 
 
 def claimed_pixels(corners_sensor: NDArray, triangles: NDArray, evidence: Evidence, agree: float) -> NDArray:
     """Numbers (k,), row by row, of the pixels whose readings lie within `agree` [m] of triangles drawn into the view."""
-    height, width = evidence.depth.shape
-    low, high = _window(np.ascontiguousarray(corners_sensor), evidence.camera)
-    u0, v0 = (int(np.clip(np.floor(low[k]), 0, side)) for k, side in ((0, width), (1, height)))
-    u1, v1 = (int(np.clip(np.ceil(high[k]) + 1, 0, side)) for k, side in ((0, width), (1, height)))
-    drawn = np.full((max(v1 - v0, 0), max(u1 - u0, 0)), np.nan)
-    _draw(np.ascontiguousarray(corners_sensor), np.ascontiguousarray(triangles), evidence.camera, u0, v0, drawn)
+    width = evidence.depth.shape[1]
+    corners = np.ascontiguousarray(corners_sensor)
+    u0, v0, u1, v1 = window(corners, evidence.camera, evidence.depth.shape)
+    depth, drawn = np.full((v1 - v0, u1 - u0), np.nan), np.full((v1 - v0, u1 - u0), -1)
+    draw(corners, np.ascontiguousarray(triangles), evidence.camera, u0, v0, depth, drawn)
     with np.errstate(invalid="ignore"):
-        v, u = np.nonzero(np.abs(evidence.depth[v0:v1, u0:u1] - drawn) < agree)
+        v, u = np.nonzero(np.abs(evidence.depth[v0:v1, u0:u1] - depth) < agree)
     return (v + v0) * width + u + u0
 
 
 @njit(cache=True)
-def _window(corners, camera):
-    """Least and greatest (u, v) [px] of corners in front of the sensor."""
+def window(corners, camera, shape):
+    """First pixel (u0, v0) and the one after the last (u1, v1) of the part of the view (height, width) that corners in front of the
+    sensor lie in."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for n in range(len(corners)):
         if camera[0] > 0.5 or corners[n, 2] > 1e-6:
             u, v = project(corners[n, 0], corners[n, 1], corners[n, 2], camera)
             low[0], low[1] = min(low[0], u), min(low[1], v)
             high[0], high[1] = max(high[0], u), max(high[1], v)
-    return np.maximum(low, -1e6), np.minimum(high, 1e6)
+    u0, v0 = int(min(max(np.floor(low[0]), 0), shape[1])), int(min(max(np.floor(low[1]), 0), shape[0]))
+    u1, v1 = int(min(max(np.ceil(high[0]) + 1, u0), shape[1])), int(min(max(np.ceil(high[1]) + 1, v0), shape[0]))
+    return u0, v0, u1, v1
 
 
 @njit(cache=True)
-def _draw(corners, triangles, camera, u0, v0, out):
-    """Draws triangles into `out` (H, W), whose first pixel is (u0, v0) of the view; the nearest surface stays."""
+def draw(corners, triangles, camera, u0, v0, out, drawn):
+    """Draws triangles into `out` (H, W) [m], whose first pixel is (u0, v0) of the view, and their numbers into `drawn` (H, W); the
+    nearest surface stays."""
     height, width = out.shape
     parallel = camera[0] > 0.5
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
@@ -68,4 +71,4 @@ def _draw(corners, triangles, camera, u0, v0, out):
                 value = a * w[0] + b * w[1] + (1.0 - a - b) * w[2]
                 z = value if parallel else 1.0 / value
                 if not out[j, i] <= z:
-                    out[j, i] = z
+                    out[j, i], drawn[j, i] = z, n

@@ -16,30 +16,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.localization.search import Search
+from handey_studio.localization.second_look import Tally
 from handey_studio.localization.verify import Verdict
 from handey_studio.world.part import Part
 
 FEATURES = (
     "outlines that should be seen are missing",  # metres of silhouette a metre of visible edge
-    "more outline is missing than is chance",  # metres a diameter of the part
     "creases that should be seen are missing",  # metres a metre of visible edge
-    "the sensor sees through it",  # root of the share of the surface
-    "its edges lie beside those that are seen",  # scatter, in slacks of the search
-    "one of its faces lies beside the readings",  # mean, in what noise and outlines leave uncertain
-    "the readings lie off its faces",  # rms, in sigmas of a reading
-    "its outline is larger than what is seen",  # margin, in spreads of what sensors lose at silhouettes
     "too few of its edges are found",  # logarithm of their number
+    "its outline is larger than what is seen",  # margin, in spreads of what sensors lose at silhouettes
+    "one of its faces lies beside the readings",  # mean, in what noise and outlines leave uncertain
+    "the sensor sees through it",  # logarithm of ten-thousandths of a square diameter
+    "readings lie before its faces",  # root of the share of the surface
     "too little of its surface is seen",  # logarithm of square diameters
     "there are no readings where it should be",  # share of the surface
-    "it would stand below the table",  # sigmas of a reading beyond two
+    "it would stand below the table",  # what noise and looseness leave uncertain
+    "it touches the table nowhere",  # 1 if a corner does, to within what noise and looseness leave uncertain
+    "no two corners touch the table",
+    "no three corners touch the table",
     "it does not rest on the table",  # 1 if three corners do, to within noise
-    "no three corners are near the table",  # 1 if they are, to within what outlines leave uncertain
 )
 FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and from which agreement decides
 AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.873  # edges times surfaces that agree: how fast odds grow, and where they are even
 EDGES_WORTH, EVEN_EDGES = 4.0, 6.0  # more edges that are found say more
 OFF_COST, SUNK_COST = 4.0, 1.5  # a sigma that the readings' rms is too large; a slack too far below the table
-REST_UNKNOWN = 0.8  # where no table is seen: about the share of right poses that rest
+TOUCHES = 2.0  # standard deviations of a corner's height, and of a reading, from the table
 
 
 class ScoreWeights(NamedTuple):
@@ -61,51 +62,70 @@ FITTED = weights_from(tomllib.loads(Path(__file__).with_name("score.toml").read_
 
 
 class Rated(NamedTuple):
-    """Poses (n,) of one part as the score looks at them: their `verdict`, the `margin` [m] and `rms` [m] of their refinement,
-    how far [m] they reach `below` the table, and how far [m] off it their third corner would
-    `rest`."""
+    """Poses (n,) of one part as the score looks at them: their `verdict`, the `margin` [m] and `rms` [m] of their refinement, how far
+    [m] their loosest point could be off, `sigma`, their `footing` (n, 3) [m], and the `tally` of the second look if they had one."""
 
     verdict: Verdict
     margin: NDArray
     rms: NDArray
-    below: NDArray
-    rest: NDArray
+    sigma: NDArray
+    footing: NDArray
+    tally: Tally | None
 
     def rows(self, chosen: NDArray) -> "Rated":
         """Some of the poses, by their numbers."""
-        return Rated(self.verdict.rows(chosen), *(array[chosen] for array in self[1:]))
+        tally = None if self.tally is None else self.tally.rows(chosen)
+        verdict, margin, rms, sigma, footing, _ = self
+        return Rated(verdict.rows(chosen), margin[chosen], rms[chosen], sigma[chosen], footing[chosen], tally)
+
+    @property
+    def below(self) -> NDArray:
+        """How far (n,) [m] they reach below the table; 0 where no table is seen."""
+        return np.maximum(-np.nan_to_num(self.footing[:, 0]), 0.0)
 
 
 def features(search: Search, part: Part, rated: Rated) -> NDArray:
-    """(n, k) the numbers that the score weighs, in the order of `FEATURES`."""
-    v, view, diameter = rated.verdict, search.view, part.solid.diameter
+    """(n, k) the numbers that the score weighs, in the order of `FEATURES`: what is not known is what is typical of right poses."""
+    found = np.concatenate([_of_edges(search, rated), _of_readings(search, part, rated), _of_footing(search, rated)], axis=1)
+    return np.where(np.isnan(found), FITTED.typical, found)
+
+
+def _of_edges(search: Search, rated: Rated) -> NDArray:
+    v, view = rated.verdict, search.view
     visible = np.maximum(v.found + v.missing, 1e-9)
-    outline = v.missing - v.unbent
-    seen = np.maximum(v.on + v.through + v.unknown, 1e-12)
     return np.stack(
         [
-            outline / visible,
-            outline / diameter,
+            (v.missing - v.unbent) / visible,
             v.unbent / visible,
-            np.minimum(np.sqrt(v.through / seen), 0.2),
-            np.minimum(v.scatter / search.slack, 5.0),
-            np.minimum(v.lifted / (view.noise + 0.1 * view.outline_error), 5.0),
-            np.minimum(rated.rms / view.noise, 6.0),
-            np.minimum(np.abs(rated.margin - search.weights.margin) / search.weights.margin_spread, 6.0),
             np.log(np.maximum(v.edges, 0.5)),
-            np.log(np.maximum(v.on, 1e-9) / diameter**2),
-            v.unknown / seen,
-            np.clip(rated.below / view.noise - 2.0, 0.0, 3.0),
-            _rests(rated, 2.0 * view.noise + 0.25 * view.outline_error),
-            _rests(rated, 2.0 * search.slack),
+            np.minimum(np.abs(rated.margin - search.weights.margin) / search.weights.margin_spread, 6.0),
+            np.minimum(v.lifted / (view.noise + 0.1 * view.outline_error), 5.0),
         ],
         axis=1,
     )
 
 
-def _rests(rated: Rated, tolerance: float) -> NDArray:
-    """1 where three corners lie within `tolerance` [m] of the table; where there is no table, what most right poses would have."""
-    return np.where(np.isinf(rated.rest), REST_UNKNOWN, rated.rest < tolerance)
+def _of_readings(search: Search, part: Part, rated: Rated) -> NDArray:
+    if rated.tally is None:
+        return np.full((len(rated.rms), 4), np.nan)
+    tally, diameter = rated.tally, part.solid.diameter
+    return np.stack(
+        [
+            np.log1p(1e4 * tally.through / diameter**2),
+            np.sqrt(np.minimum(tally.before / np.maximum(tally.on + tally.before, 1e-12), 0.25)),
+            np.log(np.maximum(tally.on, 1e-6 * diameter**2) / diameter**2),
+            tally.unread / np.maximum(tally.on + tally.through + tally.unread, 1e-12),
+        ],
+        axis=1,
+    )
+
+
+def _of_footing(search: Search, rated: Rated) -> NDArray:
+    height, view = rated.footing, search.view
+    uncertain = TOUCHES * (view.noise + np.minimum(rated.sigma, search.slack))[:, None]
+    touches = np.where(np.isnan(height), np.nan, height < uncertain)
+    rests = np.where(np.isnan(height[:, 2:]), np.nan, np.abs(height[:, 2:]) < TOUCHES * view.noise + 0.25 * view.outline_error)
+    return np.concatenate([np.clip(-height[:, :1] / uncertain - 1.0, 0.0, 4.0), touches, rests], axis=1)
 
 
 class Score(NamedTuple):

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from handey_studio.base import Ledger
 from handey_studio.localization.edges import edge_pixels
 from handey_studio.localization.evidence import Evidence, Limits, evidence_of, limits_of
-from handey_studio.localization.hypotheses import MatchTolerances, tolerances
 from handey_studio.localization.refine import Weights, weights_of
 from handey_studio.localization.result import LocateOptions
 from handey_studio.localization.segments import DataEdge, data_edges, link
 from handey_studio.localization.surface import surface_of
+from handey_studio.localization.hypotheses import MatchTolerances, tolerances
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world.part import Part
 
@@ -67,14 +67,14 @@ def look(view: DepthView, options: LocateOptions) -> Search:
     return Search(view, evidence, edges, options, limits, rough, weights, tolerances(view), table, ledger, Counter(), timing)
 
 
-def on_table(search: Search, part: Part, R: NDArray, t: NDArray) -> tuple[NDArray, NDArray]:
-    """How far [m] poses R (n, 3, 3), t (n, 3) of a part in the sensor's frame reach below the table, and how far [m] the third lowest
-    corner is off it (n,): three corners on the table are a part at rest. Zeros and infinity where no table is seen."""
+def footing(search: Search, part: Part, R: NDArray, t: NDArray) -> NDArray:
+    """Heights (n, 3) [m] above the table of the three lowest corners of poses R (n, 3, 3), t (n, 3) of a part in the sensor's frame: three
+    corners on the table are a part at rest. NaN where no table is seen."""
     if not search.table or search.options.table_z_m is None:
-        return np.zeros(len(t)), np.full(len(t), np.inf)
+        return np.full((len(t), 3), np.nan)
     up, height = search.view.T_world_sensor[2, :3], search.view.T_world_sensor[2, 3] - search.options.table_z_m
     z = part.solid.vertices @ np.einsum("nij,i->nj", R, up).T + t @ up + height
-    return np.maximum(-z.min(axis=0), 0.0), np.sort(np.abs(z), axis=0)[2]
+    return np.sort(z, axis=0)[:3].T
 
 
 def _sees_table(view: DepthView, options: LocateOptions) -> bool:
