@@ -157,7 +157,7 @@ def _creases(view: DepthView, surface: Surface, jump: NDArray, outward: NDArray)
         LEAST_ROWS,
     )
     edges = cv2.Canny(dx, dy, CREASE_SCALE * CREASE_LOW, CREASE_SCALE * CREASE_HIGH, L2gradient=True)
-    return np.asarray(edges) & bend  # Canny marks with all bits
+    return np.bitwise_and(edges, bend)  # Canny marks with all bits
 
 
 @njit(cache=True)
