@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.shapes import Shape, body_shape, box_shape, depth, link_shape
-from handey_studio.geometry.transforms import transform
+from handey_studio.geometry.transforms import inverse, transform
 from handey_studio.world.arm import Arm, arm_of, hand_hulls
 from handey_studio.world.robot import Robot
 
@@ -81,7 +81,7 @@ def true_scene(robot: Robot, bodies: Sequence[SolidBody], names: dict[str, str])
 
 
 @dataclass(frozen=True)
-class _Mover:
+class Mover:
     """A shape that moves with a link: its poses (k, 4, 4), and the axis-aligned boxes around it, corners (k, 3)."""
 
     shape: Shape
@@ -91,8 +91,8 @@ class _Mover:
     high: NDArray
 
 
-def _mover(shape: Shape, link: int, poses: NDArray) -> _Mover:
-    return _Mover(shape, link, poses, *shape.extents(poses))
+def mover(shape: Shape, link: int, poses: NDArray) -> Mover:
+    return Mover(shape, link, poses, *shape.extents(poses))
 
 
 def contacts(scene: Scene, arm: Arm, sampled: Sampled, allowed: frozenset[frozenset[str]], depths: Depths) -> list[Contact]:
@@ -102,36 +102,42 @@ def contacts(scene: Scene, arm: Arm, sampled: Sampled, allowed: frozenset[frozen
         names = (a.shape.name, b.shape.name)
         may = frozenset(names) in allowed
         limit = depths.allowed_depth if may else depths.free_depth
-        worst, when = limit, -1
-        for k in instants:
-            deep = depth(a.shape, a.poses[k], b.shape, b.poses[k])
-            if deep > worst:
-                worst, when = deep, int(k)
+        worst, when = deepest(a, b, instants, limit)
         if when >= 0:
             found.append(Contact(names, float(sampled.time[when]), worst, limit, may))
     return found
 
 
-def _pairs(scene: Scene, arm: Arm, sampled: Sampled) -> Iterator[tuple[_Mover, _Mover, NDArray]]:
+def deepest(a: Mover, b: Mover, instants: NDArray, limit: float) -> tuple[float, int]:
+    """How deep [m] two shapes meet at the instant when they do so most, and its number; `limit` and -1 when they never exceed it."""
+    worst, when = limit, -1
+    for k in instants:
+        deep = depth(a.shape, a.poses[k], b.shape, b.poses[k])
+        if deep > worst:
+            worst, when = deep, int(k)
+    return worst, when
+
+
+def _pairs(scene: Scene, arm: Arm, sampled: Sampled) -> Iterator[tuple[Mover, Mover, NDArray]]:
     """Pairs of shapes, and the instants at which they may meet."""
     movers = _movers(scene, arm, sampled)
     in_hand = scene.shapes[scene.held.name] if scene.held is not None else None
     for i, a in enumerate(movers):
         for b in movers[i + 1 :]:
             if abs(a.link - b.link) > 1:
-                yield a, b, _near(a, b)
+                yield a, b, near(a, b)
             elif a.link == b.link and b.shape is in_hand:
                 # In the hand only the fingers' opening changes where they meet the held body.
                 yield a, b, np.unique(sampled.opening, return_index=True)[1]
     for body in scene.bodies:
-        standing = _mover(scene.shapes[body.name], 0, body.T_world_body[None])
+        standing = mover(scene.shapes[body.name], 0, body.T_world_body[None])
         standing = replace(standing, poses=np.broadcast_to(body.T_world_body, (len(sampled.time), 4, 4)))
         for a in movers:
             if a.link > 0:
-                yield a, standing, _near(a, standing)
+                yield a, standing, near(a, standing)
 
 
-def _movers(scene: Scene, arm: Arm, sampled: Sampled) -> list[_Mover]:
+def _movers(scene: Scene, arm: Arm, sampled: Sampled) -> list[Mover]:
     links = arm.link_poses(sampled.q)
     T_hand = arm.hand_pose(sampled.q)
     movers = []
@@ -140,12 +146,24 @@ def _movers(scene: Scene, arm: Arm, sampled: Sampled) -> list[_Mover]:
         if shape.name in FINGER_SIDES:
             shifts = np.array([transform(None, (FINGER_SIDES[shape.name] * opening, 0.0, 0.0)) for opening in sampled.opening])
             poses = poses @ shifts
-        movers.append(_mover(shape, link, poses))
+        movers.append(mover(shape, link, poses))
     if scene.held is not None and scene.T_hand_body is not None:
-        movers.append(_mover(scene.shapes[scene.held.name], arm.n + 1, T_hand @ scene.T_hand_body))
+        movers.append(mover(scene.shapes[scene.held.name], arm.n + 1, T_hand @ scene.T_hand_body))
     return movers
 
 
-def _near(a: _Mover, b: _Mover) -> NDArray:
-    """The instants at which the boxes around two shapes meet."""
-    return np.nonzero(((a.low <= b.high) & (b.low <= a.high)).all(axis=1))[0]
+def near(a: Mover, b: Mover) -> NDArray:
+    """The instants at which the boxes around two shapes meet, and no face of either parts it from the other's box."""
+    instants = np.nonzero(((a.low <= b.high) & (b.low <= a.high)).all(axis=1))[0]
+    instants = instants[~_parted(a, b, instants)]
+    return instants[~_parted(b, a, instants)]
+
+
+def _parted(a: Mover, b: Mover, instants: NDArray) -> NDArray:
+    """Whether (k,), at each of the instants, one of b's planes has all of the box around a on its outer side."""
+    T_b_a = inverse(b.poses[instants]) @ a.poses[instants]
+    middle, half = a.shape.bounds.mean(axis=0), np.ptp(a.shape.bounds, axis=0) / 2
+    normals, offsets = b.shape.planes[:, :3], b.shape.planes[:, 3]
+    centres = T_b_a[:, :3, :3] @ middle + T_b_a[:, :3, 3]
+    reach = np.abs(normals @ T_b_a[:, :3, :3]) @ half
+    return (centres @ normals.T + offsets > reach).any(axis=1)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.cell.bodies import SolidBody
@@ -43,6 +44,14 @@ class Shape(Value):
     def bounds(self) -> NDArray:
         """Lower and upper corner (2, 3) of the box around it in its own frame."""
         return np.stack([self.corners.min(axis=0), self.corners.max(axis=0)])
+
+    @cached_property
+    def planes(self) -> NDArray:
+        """Planes (f, 4) [m], outward, that hold the shape: its faces when it is one convex piece, else its box's."""
+        if self.pieces is not None and len(self.pieces) == 1:
+            return np.unique(np.round(ConvexHull(self.corners).equations, 9), axis=0)
+        axes = np.eye(3)
+        return np.concatenate([np.c_[-axes, self.bounds[0]], np.c_[axes, -self.bounds[1]]])
 
     @cached_property
     def tree(self) -> Any:

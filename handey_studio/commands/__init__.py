@@ -3,8 +3,20 @@
 A command imports the rooms that it needs when it runs: together they take seconds to load.
 """
 
-from handey_studio.commands import bench_locate, bench_piles, fit_score, locate, move, plan, scan, scan_calibrate, scan_simulate, studio
+from handey_studio.commands import (
+    bench_locate,
+    bench_piles,
+    fit_score,
+    locate,
+    move,
+    path,
+    plan,
+    scan,
+    scan_calibrate,
+    scan_simulate,
+    studio,
+)
 
-COMMANDS = (studio, locate, scan, scan_calibrate, scan_simulate, move, plan, bench_piles, bench_locate, fit_score)
+COMMANDS = (studio, locate, scan, scan_calibrate, scan_simulate, move, plan, path, bench_piles, bench_locate, fit_score)
 
 __all__ = ["COMMANDS"]

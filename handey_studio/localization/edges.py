@@ -13,7 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
-from handey_studio.localization.surface import Camera, Noise, Surface, camera_of, reading_sigma, unproject
+from handey_studio.localization.shares import shared
+from handey_studio.localization.surface import LEAST_ROWS, Surface, camera_of, reading_sigma, unproject
 from handey_studio.sensing.depth_view import DepthView
 
 NONE, JUMP, CONVEX, CONCAVE = 0, 1, 2, 3
@@ -42,7 +43,13 @@ class EdgePixels(Value):
 def edge_pixels(view: DepthView, surface: Surface) -> EdgePixels:
     """The edge pixels of a view."""
     camera, noise = camera_of(view.projection), (view.noise, surface.typical)
-    strength, outward = _jumps(np.asarray(view.depth), surface.slope, surface.normals, camera, noise, 0.15 * surface.pixel)
+    depth, per_px = np.asarray(view.depth), 0.15 * surface.pixel
+    strength, outward = np.zeros(depth.shape, dtype=np.float32), np.zeros((*depth.shape, 2), dtype=np.int8)
+    shared(
+        lambda first, last: _jumps(depth, surface.slope, surface.normals, camera, noise, per_px, (first, last), strength, outward),
+        len(depth),
+        LEAST_ROWS,
+    )
     jump = _hysteresis(strength, WEAK * JUMP_SIGMAS, JUMP_SIGMAS)
     kind = _creases(view, surface, jump, outward)
     kind[cv2.dilate(jump, np.ones((3, 3), np.uint8)) > 0] = NONE
@@ -91,58 +98,66 @@ def _beyond(depth, v, u, dv, du):
     return MAX_GAP_PX + 1 if 0 <= y + dv < height and 0 <= x + du < width else 0
 
 
-@njit(cache=True)
-def _jumps(depth: NDArray, slope: NDArray, normals: NDArray, camera: Camera, noise: Noise, per_px: float) -> tuple[NDArray, NDArray]:
-    """How far the depth falls away beside each pixel, beyond its slope, in sigmas (H, W), and the directions to there (H, W, 2).
+@njit(cache=True, error_model="numpy")
+def _facing(u, v, d, normals, camera):
+    """Cosine between the surface's normal and the way back to the sensor; 1 where there is no normal."""
+    nx, ny, nz = normals[v, u, 0], normals[v, u, 1], normals[v, u, 2]
+    x, y, z = unproject(u, v, d, camera)
+    cosine = nz if camera[0] > 0.5 else (nx * x + ny * y + nz * z) / np.sqrt(x * x + y * y + z * z)
+    return 1.0 if np.isnan(cosine) else abs(cosine)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _jumps(depth, slope, normals, camera, noise, per_px, rows, strength, outward):
+    """How far the depth falls away beside each pixel of some rows, beyond its slope, in sigmas, into `strength` (H, W), and the directions
+    to there into `outward` (H, W, 2).
 
     Holes are crossed: at a silhouette the sensor has no readings where its light or its eye is shadowed. A hole that
     is wider than MAX_GAP_PX counts as a jump that just stands out.
     """
     height, width = depth.shape
-    strength = np.zeros((height, width), dtype=np.float32)
-    outward = np.zeros((height, width, 2), dtype=np.int8)
-    steps = ((0, 1), (0, -1), (1, 0), (-1, 0))
-    for v in range(height):
+    for v in range(rows[0], rows[1]):
         for u in range(width):
             d = depth[v, u]
             if np.isnan(d):
                 continue
             gu, gv = slope[v, u, 0], slope[v, u, 1]
-            facing = 1.0
             if np.isnan(gu):
-                gu = gv = 0.0
-            else:
-                x, y, z = unproject(u, v, d, camera)
-                facing = (
-                    normals[v, u, 2]
-                    if camera[0] > 0.5
-                    else (normals[v, u, 0] * x + normals[v, u, 1] * y + normals[v, u, 2] * z) / np.sqrt(x * x + y * y + z * z)
-                )
-            sigma = reading_sigma(d, camera, noise) / max(abs(facing), 0.2)
-            for dv, du in steps:
+                gu, gv = np.float32(0.0), np.float32(0.0)
+            squarely, sigma = reading_sigma(d, camera, noise), 0.0
+            for dv, du in ((0, 1), (0, -1), (1, 0), (-1, 0)):
                 y, x = v + dv, u + du
                 beside = 0 <= y < height and 0 <= x < width and not np.isnan(depth[y, x])
                 k = 1 if beside else _beyond(depth, v, u, dv, du)
                 if k == 0:
                     continue
-                if k > MAX_GAP_PX:
-                    fall = JUMP_SIGMAS * sigma
-                else:
-                    fall = depth[v + k * dv, u + k * du] - d - k * (gu * du + gv * dv) - per_px * (k - 1)
+                wide = k > MAX_GAP_PX
+                fall = 0.0 if wide else depth[v + k * dv, u + k * du] - d - k * (gu * du + gv * dv) - per_px * (k - 1)
+                if not wide and fall <= WEAK * JUMP_SIGMAS * squarely:
+                    continue
+                if sigma == 0.0:  # only now, as few pixels come this far
+                    sigma = squarely / max(_facing(u, v, d, normals, camera), 0.2)
+                fall = JUMP_SIGMAS * sigma if wide else fall
                 if fall > WEAK * JUMP_SIGMAS * sigma:
                     strength[v, u] = max(strength[v, u], fall / sigma)
                     outward[v, u, 0] += du
                     outward[v, u, 1] += dv
-    return strength, outward
 
 
 def _creases(view: DepthView, surface: Surface, jump: NDArray, outward: NDArray) -> NDArray:
     """(H, W) uint8 NONE, CONVEX or CONCAVE: Canny's thinning and hysteresis over the turn of the normal."""
     camera, r = camera_of(view.projection), surface.radius_px
     right, down = _free_way(jump, outward, r)
-    dx, dy, bend = _turns(np.asarray(view.depth), surface.normals, camera, right, down, r, 3.0 * view.noise)
+    depth, slack = np.asarray(view.depth), 3.0 * view.noise
+    dx, dy = np.zeros(depth.shape, dtype=np.int16), np.zeros(depth.shape, dtype=np.int16)
+    bend = np.zeros(depth.shape, dtype=np.uint8)
+    shared(
+        lambda first, last: _turns(depth, surface.normals, camera, right, down, r, slack, (first, last), dx, dy, bend),
+        len(depth),
+        LEAST_ROWS,
+    )
     edges = cv2.Canny(dx, dy, CREASE_SCALE * CREASE_LOW, CREASE_SCALE * CREASE_HIGH, L2gradient=True)
-    return edges & bend  # Canny marks with all bits
+    return np.bitwise_and(edges, bend)  # Canny marks with all bits
 
 
 @njit(cache=True)
@@ -188,23 +203,21 @@ def _turn(depth, normals, camera, v1, u1, v2, u2, change, slack):
     return 2.0 * np.arcsin(min(size / 2.0, 1.0)), ex * x + ey * y + ez * z
 
 
-@njit(cache=True)
-def _turns(
-    depth: NDArray, normals: NDArray, camera: Camera, right: NDArray, down: NDArray, r: int, slack: float
-) -> tuple[NDArray, NDArray, NDArray]:
-    """The turn of the normal over the window's width, or as far as a jump lets one go, along u and along v (H, W) int16, of one
-    sign where they go the same way, and the kind of crease that it would be."""
-    height, width = depth.shape
-    dx, dy = np.zeros((height, width), dtype=np.int16), np.zeros((height, width), dtype=np.int16)
-    kind = np.zeros((height, width), dtype=np.uint8)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _turns(depth, normals, camera, right, down, r, slack, rows, dx, dy, kind):
+    """The turn of the normal over the window's width, or as far as a jump lets one go, along u and along v, into `dx` and `dy` (H, W)
+    int16 for some rows, of one sign where they go the same way, and into `kind` the kind of crease that it would be."""
+    width = depth.shape[1]
     least = (0.5 * CREASE_LOW) ** 2  # of the two together: flatter is no crease, nor beside one
     nothing = (np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(0.0))
     above = np.zeros(width, dtype=np.int64)
-    for v in range(height):
+    for v in range(max(rows[0] - r, 0), rows[1]):
         left = 0
         for u in range(width):
             left = min(r, left + 1) if u > 0 and right[v, u - 1] > 0 else 0
             above[u] = min(r, above[u] + 1) if v > 0 and down[v - 1, u] > 0 else 0
+            if v < rows[0]:
+                continue  # the rows before only tell how far up one can go
             after, below = int(right[v, u]), int(down[v, u])
             e = _change(normals, v, u - left, v, u + after) if min(left, after) >= LEAST_WAY else nothing
             f = _change(normals, v - above[u], u, v + below, u) if min(above[u], below) >= LEAST_WAY else nothing
@@ -216,4 +229,3 @@ def _turns(
             dx[v, u] = int(CREASE_SCALE * turn_u)
             dy[v, u] = int(CREASE_SCALE * (-turn_v if opposite else turn_v))
             kind[v, u] = CONVEX if (bend_u if turn_u >= turn_v else bend_v) > 0.0 else CONCAVE
-    return dx, dy, kind

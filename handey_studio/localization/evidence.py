@@ -2,17 +2,19 @@
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.segments import Linked
+from handey_studio.localization.shares import shared
 from handey_studio.localization.surface import Surface
 from handey_studio.sensing.depth_view import DepthView, Pinhole
 
 DIRECTIONS = 6  # sectors of edge directions in the image
 SECTOR = np.pi / DIRECTIONS
+ROUGH = 1.8  # tolerances of poses straight from two edges, against those of refined ones
+MOST_REACH_PX = 100  # of an edge pixel
 U, V, X, Y, Z, KIND = range(6)  # columns of edge pixels
 TAN_15 = float(np.tan(SECTOR / 2))
 
@@ -55,33 +57,49 @@ def limits_of(view: DepthView, slack: float = 1.0) -> Limits:
 
 
 def evidence_of(view: DepthView, surface: Surface, linked: Linked) -> Evidence:
-    """The evidence of a view; only edge pixels that belong to a straight segment count."""
-    members = np.nonzero(linked.segment >= 0)[0]
+    """The evidence of a view; only edge pixels that belong to a straight segment, and have a reading, count."""
+    members = np.nonzero((linked.segment >= 0) & np.isfinite(view.depth[linked.v, linked.u]))[0]
     u, v = linked.u[members], linked.v[members]
     theta = _segment_directions(linked)[linked.segment[members]]
-    nearest = np.full((DIRECTIONS, *view.depth.shape), -1, dtype=np.int32)
-    for sector in range(DIRECTIONS):
-        off = np.abs((theta - sector * SECTOR + np.pi / 2) % np.pi - np.pi / 2)
-        chosen = np.nonzero(off <= SECTOR)[0]
-        if len(chosen):
-            nearest[sector] = _nearest(view.depth.shape, u[chosen], v[chosen], chosen)
     p = view.projection
     pinhole = isinstance(p, Pinhole)
     camera = (0.0, p.fx, p.fy, p.cx, p.cy) if pinhole else (1.0, 1.0 / p.pixel, 1.0 / p.pixel, p.cx, p.cy)
     uv = np.stack([u, v], axis=1).astype(float)
     points = view.projection.unproject(uv, view.depth[v, u])
-    return Evidence(np.array(view.depth), nearest, np.column_stack([uv, points, linked.kind[members]]), camera, surface.pixel)
+    edges = np.column_stack([uv, points, linked.kind[members]])
+    return Evidence(np.array(view.depth), _nearest(view, edges, theta, surface.pixel), edges, camera, surface.pixel)
 
 
-def _nearest(shape: tuple[int, ...], u: NDArray, v: NDArray, numbers: NDArray) -> NDArray:
-    """(H, W) int32: which of the pixels is nearest."""
-    empty = np.ones(shape, dtype=np.uint8)
-    empty[v, u] = 0
-    found = cv2.distanceTransformWithLabels(empty, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL)
-    labels = np.asarray(found[1], dtype=np.int32)
-    number_of = np.zeros(int(labels.max()) + 1, dtype=np.int32)
-    number_of[labels[v, u]] = numbers
-    return number_of[labels]
+def _nearest(view: DepthView, edges: NDArray, theta: NDArray, pixel: float) -> NDArray:
+    """(DIRECTIONS, H, W) int32: which of the edge pixels (n, 6) with directions `theta` (n,) [rad] is nearest, −1 where none is as near as
+    a rough pose's edge may lie."""
+    rough = limits_of(view, ROUGH)
+    nearest_z = np.maximum(edges[:, Z] - rough.edge_depth, 0.5 * edges[:, Z])
+    reach = np.ceil((rough.edge + 0.7 * pixel) * view.projection.pixels_per_metre(nearest_z)).astype(np.int64)
+    out = np.full((DIRECTIONS, *view.depth.shape), -1, dtype=np.int32)
+    shared(lambda first, last: _spread(edges, theta, np.minimum(reach, MOST_REACH_PX), (first, last), out), DIRECTIONS)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _spread(edges, theta, reach, sectors, nearest):
+    """Writes the number of each edge pixel of some sectors to all pixels within its reach [px] of which none is nearer; of two
+    as near that of the nearer surface counts."""
+    height, width = nearest.shape[1:]
+    for sector in range(sectors[0], sectors[1]):
+        away = np.full((height, width), 2 * MOST_REACH_PX**2, dtype=np.int32)
+        for k in range(len(edges)):
+            if abs((theta[k] - sector * SECTOR + np.pi / 2) % np.pi - np.pi / 2) > SECTOR:
+                continue
+            u, v, r = int(edges[k, U]), int(edges[k, V]), reach[k]
+            for y in range(max(v - r, 0), min(v + r + 1, height)):
+                rest = r * r - (y - v) * (y - v)
+                for x in range(max(u - r, 0), min(u + r + 1, width)):
+                    squared = (x - u) * (x - u) + (y - v) * (y - v)
+                    if (x - u) * (x - u) > rest or squared > away[y, x]:
+                        continue
+                    if squared < away[y, x] or edges[k, Z] < edges[nearest[sector, y, x], Z]:
+                        away[y, x], nearest[sector, y, x] = squared, k
 
 
 def _segment_directions(linked: Linked) -> NDArray:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from handey_studio.localization.edges import JUMP
 from handey_studio.localization.evidence import KIND, Evidence, Limits, X, Y, Z, ray_at
 from handey_studio.localization.samples import ALONG, INTO_LEFT, INTO_RIGHT, PartSamples
-from handey_studio.localization.verify import GRAZING, ON, edge_state, facing, placed, reading_at, turned
+from handey_studio.localization.shares import shared
+from handey_studio.localization.verify import GRAZING, LEAST_POSES, ON, edge_state, facing, placed, reading_at, turned
 from handey_studio.sensing.depth_view import DepthView
 
 TAPERING = 0.5  # limits shrink to this share over the iterations
@@ -56,7 +57,10 @@ def weights_of(view: DepthView, pixel: float) -> Weights:
 
 def refine(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, weights: Weights, iterations: int) -> Refined:
     """Poses R (n, 3, 3), t (n, 3) moved to where the view agrees best, each until it stands still or `iterations` are done."""
-    return Refined(*_refine(np.array(R), np.array(t), samples, evidence, limits, weights, iterations))
+    n = len(t)
+    refined = Refined(np.array(R), np.array(t), np.full(n, weights.margin), np.full(n, np.inf), np.zeros((n, 6, 6)))
+    shared(lambda first, last: _refine(refined, samples, evidence, limits, weights, iterations, (first, last)), n, LEAST_POSES)
+    return refined
 
 
 @njit(cache=True, error_model="numpy")
@@ -191,11 +195,10 @@ def _normal_equations(R, t, margin, samples, evidence, limits, weights):
     return A, g, squares, count
 
 
-@njit(cache=True, error_model="numpy")
-def _refine(R, t, samples, evidence, limits, weights, iterations):
-    margins, rms = np.full(len(t), weights.margin), np.full(len(t), np.inf)
-    covariance = np.zeros((len(t), 6, 6))
-    for n in range(len(t)):
+@njit(cache=True, nogil=True, error_model="numpy")
+def _refine(refined, samples, evidence, limits, weights, iterations, poses):
+    R, t, margins, rms, covariance = refined
+    for n in range(poses[0], poses[1]):
         for step in range(iterations):
             share = 1.0 - (1.0 - TAPERING) * step / max(iterations - 1, 1)
             tight = Limits(limits.agree, limits.hide, limits.through * share, limits.edge * share, limits.edge_depth, limits.edge)
@@ -217,4 +220,3 @@ def _refine(R, t, samples, evidence, limits, weights, iterations):
             R[n] = _turned_by(R[n], delta[:3])
             t[n] += delta[3:6]
             margins[n] = max(margins[n] + delta[6], 0.0)
-    return R, t, margins, rms, covariance

@@ -12,12 +12,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
+from handey_studio.localization.shares import shared
 from handey_studio.sensing.depth_view import DepthView, Orthographic, Pinhole
 
 MAX_NORMAL_ERROR = 0.05  # rad; the window grows until the noise of a normal is below
 MAX_SLOPE = 2.7  # tan 70°: steeper surfaces return too few readings to be told from a jump
 MIN_SAMPLES = 5
 MAX_RADIUS_PX = 6
+LEAST_ROWS = 32  # that are worth a share
 ONE_PLANE = 1.6  # sigmas rms about a plane, up to which it is taken to explain the whole window
 
 Camera = tuple[float, float, float, float, float]
@@ -50,7 +52,9 @@ def surface_of(view: DepthView) -> Surface:
     pixel = float(1.0 / view.projection.pixels_per_metre(typical))
     radius = window_radius(view.noise, pixel)
     camera, noise = camera_of(view.projection), (view.noise, typical)
-    slope, normals = _slopes(np.asarray(view.depth), camera, noise, radius, 2 if radius >= 4 else 1)
+    depth, step = np.asarray(view.depth), 2 if radius >= 4 else 1
+    slope, normals = (np.full((*depth.shape, n), np.nan, dtype=np.float32) for n in (2, 3))
+    shared(lambda first, last: _slopes(depth, camera, noise, radius, step, (first, last), slope, normals), len(depth), LEAST_ROWS)
     for array in (slope, normals):
         array.flags.writeable = False  # shared from here on, not copied
     return Surface(normals, slope, radius, pixel, typical)
@@ -93,139 +97,159 @@ def unproject(u, v, d, camera):
     return (u - camera[3]) / camera[1] * reach, (v - camera[4]) / camera[2] * reach, d
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", inline="always")
 def _normal(u, v, d, gu, gv, camera):
     """Unit normal towards the sensor: the cross product of the surface's steps along v and u."""
-    x0, y0, _ = unproject(u, v, d, camera)
-    x1, y1, _ = unproject(u + 1.0, v, d + gu, camera)
-    x2, y2, _ = unproject(u, v + 1.0, d + gv, camera)
-    ax, ay, bx, by = x2 - x0, y2 - y0, x1 - x0, y1 - y0
+    x, y, step_x, step_y = (u - camera[3]) / camera[1], (v - camera[4]) / camera[2], 1.0 / camera[1], 1.0 / camera[2]
+    if camera[0] > 0.5:
+        ax, ay, bx, by = 0.0, step_y, step_x, 0.0
+    else:
+        ax, ay, bx, by = x * gv, y * gv + step_y * (d + gv), x * gu + step_x * (d + gu), y * gu
     nx, ny, nz = ay * gu - gv * by, gv * bx - ax * gu, ax * by - ay * bx
-    length = np.sqrt(nx * nx + ny * ny + nz * nz)
-    return nx / length, ny / length, nz / length
+    scale = 1.0 / np.sqrt(nx * nx + ny * ny + nz * nz)
+    return nx * scale, ny * scale, nz * scale
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", inline="always")
 def _solve(n, su, sv, sd, suu, suv, svv, sud, svd):
     """Slopes along u and v of the plane with these sums, and whether they fix it."""
     suu, suv, svv = suu - su * su / n, suv - su * sv / n, svv - sv * sv / n
     sud, svd = sud - su * sd / n, svd - sv * sd / n
     det = suu * svv - suv * suv
-    if det < 1e-3 * (suu + svv) ** 2 / 4 + 1e-12:
-        return 0.0, 0.0, False
-    return (svv * sud - suv * svd) / det, (suu * svd - suv * sud) / det, True
+    fixed = det >= 1e-3 * (suu + svv) ** 2 / 4 + 1e-12
+    return ((svv * sud - suv * svd) / det, (suu * svd - suv * sud) / det, True) if fixed else (0.0, 0.0, False)
 
 
 @njit(cache=True)
-def _gated(depth, v, u, metres, radius, step, gate):
+def _window(radius: int, step: int) -> NDArray:
+    """The pixels of a window, every `step`-th: rows of u, v, both counted from its middle, and the greater of them."""
+    side = np.arange(-radius, radius + 1, step)
+    out = np.empty((3, len(side) ** 2))
+    for k in range(out.shape[1]):
+        out[0, k], out[1, k] = side[k % len(side)], side[k // len(side)]
+        out[2, k] = max(abs(out[0, k]), abs(out[1, k]))
+    return out
+
+
+@njit(cache=True)
+def _take_window(depth, v, u, radius, step, out):
+    """The readings of a window, every `step`-th, less its middle's; NaN where there are none."""
+    height, width = depth.shape
+    within = radius <= v < height - radius and radius <= u < width - radius
+    k, d = 0, depth[v, u]
+    for y in range(v - radius, v + radius + 1, step):
+        for x in range(u - radius, u + radius + 1, step):
+            out[k] = depth[y, x] - d if within or (0 <= y < height and 0 <= x < width) else np.nan
+            k += 1
+
+
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+def _plane(readings, window, gate, reach, slope, near, rough):
+    """The plane through a window's readings that lie within `gate` + `reach` a pixel of the middle's and within `near` + `rough` a
+    pixel of a plane of that slope: its slope, how many they are (0 if they fix none), the sum of their squares about it, and
+    how far it misses the middle's."""
+    n = su = sv = sd = suu = suv = svv = sud = svd = sdd = 0.0
+    us, vs, rings = window[0], window[1], window[2]
+    for k in range(len(readings)):
+        e, du, dv, ring = readings[k], us[k], vs[k], rings[k]
+        fits = (abs(e) <= gate + reach * ring) & (abs(e - slope[0] * du - slope[1] * dv) <= near + rough * ring)
+        w, e = (1.0, e) if fits else (0.0, 0.0)
+        n, su, sv, sd, sdd = n + w, su + w * du, sv + w * dv, sd + e, sdd + e * e
+        suu, suv, svv = suu + w * du * du, suv + w * du * dv, svv + w * dv * dv
+        sud, svd = sud + du * e, svd + dv * e
+    gu, gv, fixed = _solve(n, su, sv, sd, suu, suv, svv, sud, svd)
+    if n < MIN_SAMPLES or not fixed:
+        return (0.0, 0.0), 0.0, 0.0, 0.0
+    mean = sd / n
+    squares = sdd - sd * mean - gu * (sud - su * mean) - gv * (svd - sv * mean)
+    return (gu, gv), n, squares, mean - gu * su / n - gv * sv / n
+
+
+@njit(cache=True)
+def _gated(readings, window, metres, gate):
     """Slope at a pixel by two rounds of least squares: first over all that may be connected, then over what fits the first."""
-    height, width = depth.shape
-    d = depth[v, u]
-    gu = gv = 0.0
-    known = False
-    for again in range(2):
-        n = su = sv = sd = suu = suv = svv = sud = svd = 0.0
-        for dv in range(-radius, radius + 1, step):
-            y = v + dv
-            if y < 0 or y >= height:
-                continue
-            for du in range(-radius, radius + 1, step):
-                x = u + du
-                if x < 0 or x >= width:
-                    continue
-                e = depth[y, x] - d
-                reach = MAX_SLOPE * metres * max(abs(du), abs(dv))
-                if not abs(e) <= gate + reach or (again and abs(e - gu * du - gv * dv) > gate + 0.15 * reach):
-                    continue
-                n += 1.0
-                su, sv, sd = su + du, sv + dv, sd + e
-                suu, suv, svv = suu + du * du, suv + du * dv, svv + dv * dv
-                sud, svd = sud + du * e, svd + dv * e
-        if n < MIN_SAMPLES:
-            break
-        a, b, fixed = _solve(n, su, sv, sd, suu, suv, svv, sud, svd)
-        if not fixed:
-            break
-        gu, gv, known = a, b, True
-    return gu, gv, known
+    reach = MAX_SLOPE * metres
+    slope, n, _, _ = _plane(readings, window, gate, reach, (0.0, 0.0), np.inf, 0.0)
+    if n == 0.0:
+        return slope, False
+    again, n, _, _ = _plane(readings, window, gate, reach, slope, gate, 0.15 * reach)
+    return (again if n > 0.0 else slope), True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _take_row(columns, depth, row, reference, sign):
-    """A row's readings into (or, with sign −1, out of) the sums of each column: n, v, v², depth, v·depth, depth²."""
+    """A row's readings into (or, with sign −1, out of) the sums of each column: holes, depth, v·depth, depth²."""
     y = row - 0.5 * depth.shape[0]
-    for u in range(depth.shape[1]):
-        e = depth[row, u] - reference
-        if not np.isnan(e):
-            c = columns[u]
-            c[0] += sign
-            c[1] += sign * y
-            c[2] += sign * y * y
-            c[3] += sign * e
-            c[4] += sign * y * e
-            c[5] += sign * e * e
+    holes, first, tilted, squares = columns[0], columns[1], columns[2], columns[3]
+    readings = depth[row]
+    for u in range(len(readings)):
+        e = readings[u] - reference
+        hole = np.isnan(e)
+        e = 0.0 if hole else sign * e
+        holes[u] += sign if hole else 0.0
+        first[u] += e
+        tilted[u] += y * e
+        squares[u] += e * e * sign
 
 
-@njit(cache=True)
-def _take_column(sums, c, x, sign):
-    """A column's sums into (or out of) the window's: n, u, v, depth, u², uv, v², u·depth, v·depth, depth²."""
-    sums[0] += sign * c[0]
-    sums[1] += sign * x * c[0]
-    sums[2] += sign * c[1]
-    sums[3] += sign * c[3]
-    sums[4] += sign * x * x * c[0]
-    sums[5] += sign * x * c[1]
-    sums[6] += sign * c[2]
-    sums[7] += sign * x * c[3]
-    sums[8] += sign * c[4]
-    sums[9] += sign * c[5]
+@njit(cache=True, error_model="numpy")
+def _over_windows(columns, y, radius, sums):
+    """The columns' sums added up over each window of a row, from the first that lies within the view: holes, depth, u·depth, v·depth,
+    depth², with u and v counted from the window's middle, in row y."""
+    inner = columns.shape[1] - 2 * radius
+    sums[:] = 0.0
+    for k in range(2 * radius + 1):
+        holes, first, tilted, squares = columns[0, k:], columns[1, k:], columns[2, k:], columns[3, k:]
+        for u in range(inner):
+            sums[0, u] += holes[u]
+            sums[1, u] += first[u]
+            sums[2, u] += (k - radius) * first[u]
+            sums[3, u] += tilted[u] - y * first[u]
+            sums[4, u] += squares[u]
 
 
-@njit(cache=True)
-def _one_plane(s, u, v, e, sigma):
-    """Slope of the plane through a window's readings, and whether it explains them all, the pixel's own `e` among them."""
-    n = s[0]
-    gu, gv, fixed = _solve(n, s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8])
-    if not fixed or n < 2 * MIN_SAMPLES:
-        return gu, gv, False
-    mean = s[3] / n
-    squares = s[9] - s[3] * mean - gu * (s[7] - s[1] * mean) - gv * (s[8] - s[2] * mean)
-    off = e - mean - gu * (u - s[1] / n) - gv * (v - s[2] / n)
-    limit = ONE_PLANE * sigma
-    return gu, gv, squares <= limit * limit * (n - 3.0) and abs(off) <= 3.0 * limit
+@njit(cache=True, error_model="numpy", inline="always")
+def _whole(sums, k, e, radius):
+    """As `_plane`, of all readings of a window without holes, from its sums; `e` is the middle's."""
+    n = (2.0 * radius + 1.0) ** 2
+    spread = n * radius * (radius + 1.0) / 3.0
+    gu, gv, mean = sums[2, k] / spread, sums[3, k] / spread, sums[1, k] / n
+    return (gu, gv), n, sums[4, k] - mean * sums[1, k] - (gu * gu + gv * gv) * spread, mean - e
 
 
-@njit(cache=True)
-def _slopes(depth: NDArray, camera: Camera, noise: Noise, radius: int, step: int) -> tuple[NDArray, NDArray]:
-    """Slopes (H, W, 2) [m/px] and normals (H, W, 3), NaN where there are too few readings."""
+@njit(cache=True, nogil=True)
+def _slopes(
+    depth: NDArray, camera: Camera, noise: Noise, radius: int, step: int, rows: tuple[int, int], slopes: NDArray, normals: NDArray
+) -> None:
+    """Slopes (H, W, 2) [m/px] and normals (H, W, 3) of some rows, left as they are where there are too few readings."""
     height, width = depth.shape
-    slope = np.full((height, width, 2), np.nan, dtype=np.float32)
-    normals = np.full((height, width, 3), np.nan, dtype=np.float32)
-    columns, sums = np.zeros((width, 6)), np.zeros(10)
-    reference = noise[1]
-    for v in range(min(radius, height)):
-        _take_row(columns, depth, v, reference, 1.0)
-    for v in range(height):
+    columns, sums = np.zeros((4, width)), np.zeros((5, max(width - 2 * radius, 0)))
+    whole, coarse = _window(radius, 1), _window(radius, step)
+    readings, fewer = np.empty(whole.shape[1]), np.empty(coarse.shape[1])
+    for v in range(max(rows[0] - radius, 0), min(rows[0] + radius, height)):
+        _take_row(columns, depth, v, noise[1], 1.0)
+    for v in range(rows[0], rows[1]):
         if v + radius < height:
-            _take_row(columns, depth, v + radius, reference, 1.0)
-        if v - radius > 0:
-            _take_row(columns, depth, v - radius - 1, reference, -1.0)
-        sums[:] = 0.0
-        for u in range(min(radius, width)):
-            _take_column(sums, columns[u], u - 0.5 * width, 1.0)
+            _take_row(columns, depth, v + radius, noise[1], 1.0)
+        if v - radius > max(rows[0] - radius, 0):
+            _take_row(columns, depth, v - radius - 1, noise[1], -1.0)
+        _over_windows(columns, v - 0.5 * height, radius, sums)
+        inside = radius <= v < height - radius
         for u in range(width):
-            if u + radius < width:
-                _take_column(sums, columns[u + radius], u + radius - 0.5 * width, 1.0)
-            if u - radius > 0:
-                _take_column(sums, columns[u - radius - 1], u - radius - 1 - 0.5 * width, -1.0)
             d = depth[v, u]
             if np.isnan(d):
                 continue
+            k = u - radius
+            if inside and 0 <= k < sums.shape[1] and sums[0, k] == 0.0:
+                slope, n, squares, off = _whole(sums, k, d - noise[1], radius)
+            else:
+                _take_window(depth, v, u, radius, 1, readings)
+                slope, n, squares, off = _plane(readings, whole, np.inf, 0.0, (0.0, 0.0), np.inf, 0.0)
             sigma = reading_sigma(d, camera, noise)
-            gu, gv, known = _one_plane(sums, u - 0.5 * width, v - 0.5 * height, d - reference, sigma)
-            if not known:
-                gu, gv, known = _gated(depth, v, u, pixel_size(d, camera), radius, step, 4.0 * sigma)
+            limit, known = ONE_PLANE * sigma, n >= 2 * MIN_SAMPLES
+            if not (known and squares <= limit * limit * (n - 3.0) and abs(off) <= 3.0 * limit):
+                _take_window(depth, v, u, radius, step, fewer)
+                slope, known = _gated(fewer, coarse, pixel_size(d, camera), 4.0 * sigma)
             if known:
-                slope[v, u, 0], slope[v, u, 1] = gu, gv
-                normals[v, u, 0], normals[v, u, 1], normals[v, u, 2] = _normal(u, v, d, gu, gv, camera)
-    return slope, normals
+                slopes[v, u, 0], slopes[v, u, 1] = slope
+                normals[v, u, 0], normals[v, u, 1], normals[v, u, 2] = _normal(u, v, d, slope[0], slope[1], camera)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from handey_studio.localization.edges import CONVEX
 from handey_studio.localization.evidence import KIND, Evidence, Limits, U, V, Z, nearest_edge, pixels_per_metre, project, ray_at
 from handey_studio.localization.samples import ALONG, INTO_LEFT, INTO_RIGHT, LEFT, RIGHT, PartSamples
+from handey_studio.localization.shares import shared
 
 ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
 GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on
@@ -23,6 +24,7 @@ ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but 
 CREASE_DISCOUNT = 0.5  # of a missing edge, if it is a crease
 GLANCE = 50  # points of all faces that the first look takes
 MAX_THROUGH = 0.3
+LEAST_POSES = 5  # that are worth a share
 MIN_VISIBLE_SHARE = 0.2  # of an edge's samples that must be visible for the edge to be predicted
 MIN_EDGE_SHARE = 0.5  # of an edge's visible samples that must be found for the edge to count as found
 
@@ -77,7 +79,8 @@ class Verdict(NamedTuple):
 
 def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, every: int = 1) -> Verdict:
     """Verdicts on the poses R (n, 3, 3), t (n, 3) of the part in the sensor's frame, from every `every`-th sample."""
-    counts = _verify(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits, every)
+    R, t, counts = np.ascontiguousarray(R), np.ascontiguousarray(t), np.zeros((len(t), 11))
+    shared(lambda first, last: _verify(R, t, samples, evidence, limits, every, (first, last), counts), len(t), LEAST_POSES)
     lengths_and_areas = (0, 1, 2, 3, 4, 5, 9)
     counts[:, lengths_and_areas] *= every
     return Verdict(*counts.T)
@@ -86,7 +89,9 @@ def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, lim
 def unopposed(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits) -> NDArray:
     """Numbers of the poses R (n, 3, 3), t (n, 3) that a glance does not rule out: the sensor sees through less than `MAX_THROUGH` of
     the few points of the faces that it looks at."""
-    return np.nonzero(_unopposed(np.ascontiguousarray(R), np.ascontiguousarray(t), samples, evidence, limits))[0]
+    R, t, good = np.ascontiguousarray(R), np.ascontiguousarray(t), np.zeros(len(t), dtype=np.bool_)
+    shared(lambda first, last: _unopposed(R, t, samples, evidence, limits, (first, last), good), len(t), 20 * LEAST_POSES)
+    return np.nonzero(good)[0]
 
 
 @njit(cache=True, error_model="numpy")
@@ -262,12 +267,11 @@ def _surfaces(R, t, samples, evidence, limits, offset, every, out):
     out[10] = max(out[10], abs(total) / count if count >= MIN_OF_ONE else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
-def _unopposed(R, t, samples, evidence, limits):
+@njit(cache=True, nogil=True, error_model="numpy")
+def _unopposed(R, t, samples, evidence, limits, poses, good):
     points, faces, rims, depth, camera = samples.face_point, samples.face, samples.face_rim, evidence.depth, evidence.camera
-    good = np.zeros(len(t), dtype=np.bool_)
     step = max(1, len(faces) // GLANCE)
-    for n in range(len(t)):
+    for n in range(poses[0], poses[1]):
         normals = turned(R[n], samples.normal)
         on = through = 0
         for k in range(n % step, len(faces), step):
@@ -279,13 +283,10 @@ def _unopposed(R, t, samples, evidence, limits):
             seen, _ = reading_at(x, y, z, depth, camera, limits)
             on, through = on + (seen == ON), through + (seen == THROUGH)
         good[n] = on > 0 and through <= MAX_THROUGH * (on + through)
-    return good
 
 
-@njit(cache=True, error_model="numpy")
-def _verify(R, t, samples, evidence, limits, every):
-    out = np.zeros((len(t), 11))
-    for n in range(len(t)):
+@njit(cache=True, nogil=True, error_model="numpy")
+def _verify(R, t, samples, evidence, limits, every, poses, out):
+    for n in range(poses[0], poses[1]):
         _edges(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
         _surfaces(R[n], t[n], samples, evidence, limits, n % every, every, out[n])
-    return out

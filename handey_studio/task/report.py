@@ -33,13 +33,13 @@ def _move(result: MoveResult) -> dict[str, Any]:
         "steps": [_step(step) for step in plan.steps] if plan else [],
         "certificate": certificate_report(plan.certificate) if plan else None,
         "options": {"tried": len(options), "rejected": rejected_counts(options)},
-        "ledger": [_entry(entry) for entry in result.ledger],
+        "ledger": [entry_report(entry) for entry in result.ledger],
         "physics": result.physics,
         "timing_s": result.timing_s,
     }
 
 
-def _entry(entry: Entry) -> dict[str, Any]:
+def entry_report(entry: Entry) -> dict[str, Any]:
     """An entry with its numbers as JSON has them: what is not finite is null."""
     numbers = {key: _finite(getattr(entry, key)) for key in ("value", "limit")}
     return asdict(entry) | numbers

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from handey_studio.base import BadInput, frozen_array
 from handey_studio.geometry.transforms import inverse
-from handey_studio.world.ik import IK_SOLVERS
+from handey_studio.world.ik import IK_SOLVERS, branches
 from handey_studio.world.link_body import link_body
 from handey_studio.world.robot import Robot
+from handey_studio.world.screws import Screws
 
 
 @lru_cache(maxsize=1)
@@ -48,6 +49,13 @@ class Arm:
         self.T_last_hand = frozen_array(self.T_last_flange @ robot.hand.T_flange_hand)
         self.bodies = tuple(link_body(g) for g in collision.geometryObjects if g.name not in robot.ignored_bodies)
 
+    @cached_property
+    def screws(self) -> Screws:
+        """The joints' axes in the base's frame, at zero."""
+        poses = inverse(self.robot.T_world_base) @ self.link_poses(np.zeros(self.n))
+        directions = np.einsum("nij,nj->ni", poses[1:, :3, :3], self.axes)
+        return Screws(np.ascontiguousarray(poses[1:, :3, 3]), np.ascontiguousarray(directions), poses[-1] @ self.T_last_flange)
+
     @property
     def n(self) -> int:
         """Number of joints."""
@@ -67,14 +75,16 @@ class Arm:
         """T_world_hand (..., 4, 4) for configurations (..., n) [rad]."""
         return self.link_poses(q)[..., -1, :, :] @ self.T_last_hand
 
-    def ik(self, T_world_hand: NDArray) -> NDArray:
+    def ik(self, T_world_hand: NDArray, held: NDArray | None = None) -> NDArray:
         """All configurations (k, n) [rad] that put the hand at a pose (4, 4), one a branch, each angle in (-π, π].
 
-        Those outside the joint limits are included, so that the caller can say how far; k = 0 when out of reach. Angles
-        a whole turn away that lie within the limits as well are the same branch: see `nearest_turns`.
+        Held joints stand at `held` (h,) [rad], or at each of the robot's values in turn. Those outside the joint limits are included, so
+        that the caller can say how far; k = 0 when out of reach. Angles a whole turn away that lie within the limits as well are the same
+        branch: see `nearest_turns`.
         """
         T_base_flange = inverse(self.robot.T_world_base) @ T_world_hand @ inverse(self.robot.hand.T_flange_hand)
-        return self._solver(T_base_flange)
+        values = self.robot.held_values if held is None else np.asarray(held, dtype=float)[None]
+        return branches(self._solver, T_base_flange, values, self.robot.held_index)
 
     def nearest_turns(self, q: NDArray, near: NDArray) -> NDArray:
         """Each angle of q (..., n) shifted by whole turns as close to `near` (n,) as the joint limits allow."""

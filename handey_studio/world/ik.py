@@ -1,95 +1,134 @@
-"""Inverse kinematics in closed form. Each solver takes T_base_flange (4, 4) and returns every branch (k, n) [rad].
+"""Inverse kinematics: every branch, by the solver that suits an arm's layout.
 
-Source of the UR solution: K. Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", 2013. The
-Denavit–Hartenberg lengths are read from the loaded model, so that one solver serves the whole family.
+A solver is built for an arm once. It takes T_base_flange (4, 4) and the values of the held joints (h,) [rad], and returns every branch
+(k, n) [rad], limits aside. What closed forms find is polished where they lose digits, beside singularities.
 """
 
 from collections.abc import Callable
-from itertools import product
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import inverse
+from handey_studio.world.ik_closed import spherical_wrist, three_parallel
+from handey_studio.world.ik_newton import FAR_ROUNDS, NEAR_ROUNDS, from_starts
+from handey_studio.world.ik_seven import held_third
+from handey_studio.world.screws import Screws
+from handey_studio.world.vectors import Vector
 
 if TYPE_CHECKING:
     from handey_studio.world.arm import Arm
 
-Solver = Callable[[NDArray], NDArray]
-REACH_SLACK = 1e-9  # a cosine may leave [-1, 1] by this much from rounding and still count as a stretched arm
+Solver = Callable[[NDArray, NDArray], NDArray]
+
+SAME_M, SAME_RAD = 1e-6, 1e-6  # axes this near meet, this near in direction are parallel
+SAME_BRANCH_RAD = 1e-5  # configurations this near are one branch, found twice
+STARTS = 600
+SIX = np.arange(6)
 
 
-def ur_solver(arm: "Arm") -> Solver:
-    """IK of a Universal Robots arm: up to eight branches."""
-    T = arm.T_links
-    d1, a2, a3 = T[0, 2, 3], -T[2, 2, 3], -T[3, 2, 3]
-    d4 = T[1, 1, 3] + T[2, 1, 3] + T[4, 1, 3]
-    d5, d6 = T[5, 2, 3], arm.T_last_flange[1, 3]
-    # The model's base frame is turned half a turn about z against the Denavit–Hartenberg one.
-    turn = np.diag([-1.0, -1.0, 1.0, 1.0])
-    last = _calibrate_flange(arm, d1, a2, a3, d4, d5, d6, turn)
+def ur(arm: "Arm") -> Solver:
+    """Axes 2, 3 and 4 parallel, 5 and 6 meeting: up to eight branches."""
+    screws = _six(arm, "ur")
+    _parallel(arm, screws, "ur", (2, 3, 4))
+    meet, back = _meeting(arm, screws, "ur", (5, 6)), inverse(screws.T_zero)
+    return lambda T, held: from_starts(screws, T, three_parallel(screws, T @ back, meet), SIX, NEAR_ROUNDS)
 
-    def solve(T_base_flange: NDArray) -> NDArray:
-        return _ur_branches(turn @ T_base_flange @ last, d1, a2, a3, d4, d5, d6)
+
+def wrist(arm: "Arm") -> Solver:
+    """Axes 2 and 3 parallel, 4, 5 and 6 meeting: up to eight branches."""
+    screws = _six(arm, "spherical_wrist")
+    _parallel(arm, screws, "spherical_wrist", (2, 3))
+    meet, back = _meeting(arm, screws, "spherical_wrist", (4, 5, 6)), inverse(screws.T_zero)
+    return lambda T, held: from_starts(screws, T, spherical_wrist(screws, T @ back, meet), SIX, NEAR_ROUNDS)
+
+
+def seven(arm: "Arm") -> Solver:
+    """Seven joints of which the third is held; axes 1, 2 and 3 meet, 5 and 6 meet."""
+    screws = arm.screws
+    if arm.n != 7 or list(arm.robot.held_index) != [2]:
+        raise _unfit(arm, "seven", f"needs 7 joints of which the third is held, it has {arm.n} and holds {list(arm.robot.held_joints)}")
+    shoulder, meet = _meeting(arm, screws, "seven", (1, 2, 3)), _meeting(arm, screws, "seven", (5, 6))
+    back = inverse(screws.T_zero)
+    return lambda T, held: held_third(screws, T, T @ back, shoulder, meet, float(held[0]), NEAR_ROUNDS)
+
+
+def numeric(arm: "Arm") -> Solver:
+    """Any layout of six free joints: from many starts, the same ones each time. Slower, and a branch in a hundred may be missed."""
+    robot, screws = arm.robot, arm.screws
+    free = np.setdiff1d(np.arange(arm.n), robot.held_index)
+    if len(free) != 6:
+        raise _unfit(arm, "numeric", f"needs 6 free joints, it has {len(free)}; name all but six in held_joints")
+    half = np.minimum((robot.upper - robot.lower) / 2, np.pi)
+    middle = (robot.upper + robot.lower) / 2
+    starts = np.random.default_rng(0).uniform(middle - half, middle + half, (STARTS, arm.n))
+
+    def solve(T: NDArray, held: NDArray) -> NDArray:
+        starts[:, robot.held_index] = held
+        return from_starts(screws, T, starts, free, FAR_ROUNDS)
 
     return solve
 
 
-def _calibrate_flange(arm: "Arm", d1: float, a2: float, a3: float, d4: float, d5: float, d6: float, turn: NDArray) -> NDArray:
-    """The fixed T_flange_dh6 of this model; BadInput when the arm is not of the UR family."""
-    fixed = []
-    for q in (np.zeros(6), np.array([0.3, -1.1, 0.9, 0.4, -0.7, 1.3])):
-        T_base_flange = inverse(arm.robot.T_world_base) @ arm.link_poses(q)[-1] @ arm.T_last_flange
-        fixed.append(inverse(turn @ T_base_flange) @ _ur_forward(q, d1, a2, a3, d4, d5, d6))
-    if np.abs(fixed[0] - fixed[1]).max() > 1e-6:
-        raise BadInput(f'robot "{arm.robot.name}": ik = "ur" needs the joint layout of a Universal Robots arm.')
-    return fixed[0]
+IK_SOLVERS: dict[str, Callable[["Arm"], Solver]] = {"ur": ur, "spherical_wrist": wrist, "seven": seven, "numeric": numeric}
 
 
-def _dh(theta: float, d: float, a: float, alpha: float) -> NDArray:
-    ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-    return np.array([[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]])
+def branches(solver: Solver, T_base_flange: NDArray, held_values: NDArray, held_index: NDArray) -> NDArray:
+    """Every branch (k, n) for each row of the held values (m, h) in turn, each once, angles in (-π, π], the held ones as given."""
+    found = []
+    for held in held_values:
+        q = distinct(solver(np.ascontiguousarray(T_base_flange), held))
+        q[:, held_index] = held
+        found.append(q)
+    return np.concatenate(found)
 
 
-def _ur_forward(q: NDArray, d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> NDArray:
-    rows = ((d1, 0, np.pi / 2), (0, a2, 0), (0, a3, 0), (d4, 0, np.pi / 2), (d5, 0, -np.pi / 2), (d6, 0, 0))
-    T = np.eye(4)
-    for theta, (d, a, alpha) in zip(q, rows, strict=True):
-        T = T @ _dh(theta, d, a, alpha)
-    return T
+@njit(cache=True)
+def distinct(rows: NDArray) -> NDArray:
+    """Configurations (k, n) with angles in (-π, π], those that differ from all before them."""
+    out, count = np.pi - np.mod(np.pi - rows, 2 * np.pi), 0
+    for k in range(len(rows)):
+        new = True
+        for before in range(count):
+            gap = 0.0
+            for i in range(rows.shape[1]):
+                gap = max(gap, abs(np.mod(out[k, i] - out[before, i] + np.pi, 2 * np.pi) - np.pi))
+            new = new and gap > SAME_BRANCH_RAD
+        if new:
+            out[count] = out[k]
+            count += 1
+    return out[:count]
 
 
-def _ur_branches(T06: NDArray, d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> NDArray:
-    """All solutions (k, 6) of the standard Denavit–Hartenberg arm."""
-    p05 = T06[:3, 3] - d6 * T06[:3, 2]
-    radius = np.hypot(p05[0], p05[1])
-    if radius < abs(d4) * (1 - REACH_SLACK):
-        return np.empty((0, 6))
-    solutions = []
-    for shoulder, wrist, elbow in product((1, -1), repeat=3):
-        q1 = np.arctan2(p05[1], p05[0]) + shoulder * np.arccos(min(1.0, d4 / radius)) + np.pi / 2
-        s1, c1 = np.sin(q1), np.cos(q1)
-        cos5 = (T06[0, 3] * s1 - T06[1, 3] * c1 - d4) / d6
-        if abs(cos5) > 1 + REACH_SLACK:
-            continue
-        q5 = wrist * np.arccos(np.clip(cos5, -1, 1))
-        s5 = np.sin(q5)
-        # At the wrist's singularity joints 4 and 6 turn about parallel axes; any share between them is right.
-        y6, x6 = -T06[0, 1] * s1 + T06[1, 1] * c1, T06[0, 0] * s1 - T06[1, 0] * c1
-        q6 = 0.0 if abs(s5) < 1e-8 else np.arctan2(y6 / s5, x6 / s5)
-        T14 = inverse(_dh(q1, d1, 0, np.pi / 2)) @ T06 @ inverse(_dh(q5, d5, 0, -np.pi / 2) @ _dh(q6, d6, 0, 0))
-        x, y = T14[:2, 3]
-        cos3 = (x * x + y * y - a2 * a2 - a3 * a3) / (2 * a2 * a3)
-        if abs(cos3) > 1 + REACH_SLACK:
-            continue
-        q3 = elbow * np.arccos(np.clip(cos3, -1, 1))
-        q2 = np.arctan2(y, x) - np.arctan2(a3 * np.sin(q3), a2 + a3 * np.cos(q3))
-        q4 = np.arctan2(T14[1, 0], T14[0, 0]) - q2 - q3
-        solutions.append([q1, q2, q3, q4, q5, q6])
-    wrapped = np.array(solutions).reshape(-1, 6)
-    return np.pi - np.mod(np.pi - wrapped, 2 * np.pi)
+def _six(arm: "Arm", name: str) -> Screws:
+    if arm.n != 6:
+        raise _unfit(arm, name, f"needs 6 joints, it has {arm.n}")
+    return arm.screws
 
 
-IK_SOLVERS: dict[str, Callable[["Arm"], Solver]] = {"ur": ur_solver}
+def _parallel(arm: "Arm", screws: Screws, name: str, numbers: tuple[int, ...]) -> None:
+    for a, b in pairwise(numbers):
+        slope = float(np.linalg.norm(np.cross(screws.directions[a - 1], screws.directions[b - 1])))
+        if slope > SAME_RAD:
+            raise _unfit(arm, name, f"needs axes {a} and {b} parallel, they are {np.rad2deg(np.arcsin(min(slope, 1.0))):.3g}° apart")
+
+
+def _meeting(arm: "Arm", screws: Screws, name: str, numbers: tuple[int, ...]) -> Vector:
+    """The point [m] in which axes meet at zero, numbered from 1."""
+    index = np.array(numbers) - 1
+    along, points = screws.directions[index], screws.points[index]
+    square = np.eye(3) - along[:, :, None] * along[:, None, :]
+    meet = np.linalg.lstsq(square.sum(axis=0), (square @ points[:, :, None]).sum(axis=0)[:, 0], rcond=None)[0]
+    gap = float(np.linalg.norm((square @ (meet - points)[:, :, None])[:, :, 0], axis=1).max())
+    if gap > SAME_M:
+        listed = " and ".join(str(number) for number in numbers)
+        raise _unfit(arm, name, f"needs axes {listed} to meet in a point, they pass it by {1e3 * gap:.3g} mm")
+    return float(meet[0]), float(meet[1]), float(meet[2])
+
+
+def _unfit(arm: "Arm", name: str, why: str) -> BadInput:
+    return BadInput(f'robot "{arm.robot.name}": ik = "{name}" {why}; ik = "numeric" takes any layout.')
