@@ -11,6 +11,7 @@ from handey_studio.localization.result import Hypothesis, LocatedPose, pose_matr
 from handey_studio.localization.search import Search
 
 MOST_RIVALS = 60  # candidates that are weighed against one another
+SURE = 1.0 - 1e-9  # no view makes a pose more probable than this
 
 
 class Fall(NamedTuple):
@@ -43,7 +44,7 @@ def _jointly(search: Search, candidates: list[Candidate], falls: dict[int, Fall]
     falls.update({n: Fall("too many better poses", k, MOST_RIVALS, "") for k, n in enumerate(ranked) if k >= MOST_RIVALS})
     standing = ranked[:MOST_RIVALS]
     # How much more probable the view is with a pose than without any: of two that exclude each other the more probable one stands.
-    worth = [-float(np.log1p(-candidates[n].score.probability)) for n in standing]
+    worth = [-float(np.log1p(-min(candidates[n].score.probability, SURE))) for n in standing]
     joint = explain_jointly(search, [candidates[n] for n in standing], worth)
     falls.update({standing[k]: Fall(*rivalry) for k, rivalry in joint.fell.items()})
     chosen = []
