@@ -72,7 +72,7 @@ def space_normal(run, plane, camera):
     return n / np.sqrt(np.sum(n * n))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gather(seen: Seen, run: Run, side: float, inner: float, outer: float) -> NDArray:
     """Readings on one side of a run, at c from `inner` to `outer`: rows of s, |c|, w, dw/ds, dw/d|c|, column; each pixel once."""
     height, width = seen.depth.shape
@@ -115,73 +115,74 @@ def _gather(seen: Seen, run: Run, side: float, inner: float, outer: float) -> ND
 def _seed(rows: NDArray, low: float, high: float, plane: NDArray) -> int:
     """A first plane from the windows' slopes at c from `low` to `high`: medians. How many readings it comes from."""
     n = 0
-    values = np.empty((3, len(rows)))
-    for row in rows:
-        if low <= row[1] <= high and not np.isnan(row[3]):
-            values[0, n], values[1, n] = row[3], row[4]
+    values, chosen = np.empty((3, len(rows))), np.empty(len(rows), dtype=np.int64)
+    for k in range(len(rows)):
+        if low <= rows[k, 1] <= high and not np.isnan(rows[k, 3]):
+            values[0, n], values[1, n], chosen[n] = rows[k, 3], rows[k, 4], k
             n += 1
     if n < FEW // 2:
         return 0
     plane[1], plane[2] = np.median(values[0, :n]), np.median(values[1, :n])
-    n = 0
-    for row in rows:
-        if low <= row[1] <= high and not np.isnan(row[3]):
-            values[2, n] = row[2] - plane[1] * row[0] - plane[2] * row[1]
-            n += 1
+    for i in range(n):
+        k = chosen[i]
+        values[2, i] = rows[k, 2] - plane[1] * rows[k, 0] - plane[2] * rows[k, 1]
     plane[0] = np.median(values[2, :n])
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _reach(rows: NDArray, plane: NDArray, gate: float, outer: float) -> float:
     """Up to which c the readings keep to the plane: until most of those at one distance do not."""
     bands = int(outer) + 1
     known, good = np.zeros(bands), np.zeros(bands)
-    for row in rows:
-        band = min(int(row[1]), bands - 1)
+    w, along, across = plane[0], plane[1], plane[2]
+    for k in range(len(rows)):
+        band = min(int(rows[k, 1]), bands - 1)
         known[band] += 1.0
-        if abs(row[2] - plane[0] - plane[1] * row[0] - plane[2] * row[1]) <= gate:
-            good[band] += 1.0
+        good[band] += abs(rows[k, 2] - w - along * rows[k, 0] - across * rows[k, 1]) <= gate
     for band in range(2, bands):
         if good[band] < 0.6 * known[band] or known[band] < 0.2 * known.max():
             return float(band)
     return outer
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _inverse(n: float, s: float, c: float, ss: float, sc: float, cc: float) -> tuple[NDArray, float]:
+    """The inverse of a symmetric matrix by its rows, and its determinant as a share of what the diagonal alone would make."""
+    a, b, d = ss * cc - sc * sc, c * sc - s * cc, s * sc - c * ss
+    determinant = n * a + s * b + c * d
+    adjugate = np.array([[a, b, d], [b, n * cc - c * c, s * c - n * sc], [d, s * c - n * sc, n * ss - s * s]])
+    return adjugate / determinant, determinant / (n * ss * cc)
+
+
+@njit(cache=True, error_model="numpy")
 def _fit(rows: NDArray, plane: NDArray, gate: float, reach: float) -> tuple[int, NDArray, float, float]:
     """The plane moved to the least squares of the readings within the gate and reach; their number, the inverse of the normal
     matrix, the mean square residual and how much neighbours' residuals resemble one another (0 to 1)."""
-    N, g = np.zeros((3, 3)), np.zeros(3)
-    x = np.ones(3)
+    w, along, across = plane[0], plane[1], plane[2]
     n = 0
-    squares = alike = 0.0
+    squares = alike = es = ec = ew = s1 = c1 = ss = sc = cc = 0.0
     before, column = 0.0, -1.0
-    for row in rows:
-        if row[1] > reach:
+    for k in range(len(rows)):
+        s, c = rows[k, 0], rows[k, 1]
+        if c > reach:
             continue
-        e = row[2] - plane[0] - plane[1] * row[0] - plane[2] * row[1]
+        e = rows[k, 2] - w - along * s - across * c
         if abs(e) > gate:
             column = -1.0
             continue
-        x[1], x[2] = row[0], row[1]
         n += 1
         squares += e * e
-        if column == row[5]:
+        if column == rows[k, 5]:
             alike += e * before
-        before, column = e, row[5]
-        for i in range(3):
-            g[i] += x[i] * e
-            for k in range(3):
-                N[i, k] += x[i] * x[k]
-    if n < FEW:
-        return 0, N, 0.0, 0.0
-    scale = np.sqrt(np.diag(N))
-    M = N / np.outer(scale, scale)
-    if np.linalg.det(M) < 1e-6:
-        return 0, N, 0.0, 0.0
-    inverse = np.linalg.inv(M) / np.outer(scale, scale)
-    plane += inverse @ g
+        before, column = e, rows[k, 5]
+        ew, es, ec = ew + e, es + s * e, ec + c * e
+        s1, c1, ss, sc, cc = s1 + s, c1 + c, ss + s * s, sc + s * c, cc + c * c
+    inverse, share = _inverse(float(n), s1, c1, ss, sc, cc)
+    if n < FEW or share < 1e-6:
+        return 0, inverse, 0.0, 0.0
+    for k in range(3):
+        plane[k] += inverse[k, 0] * ew + inverse[k, 1] * es + inverse[k, 2] * ec
     return n, inverse, squares / n, min(max(alike / max(squares, 1e-30), 0.0), 0.8)
 
 
@@ -204,10 +205,7 @@ def flank(seen: Seen, run: Run, side: float, inner: float, seed_from: float) -> 
         reach = _reach(rows, plane, GATE * spread, outer)
         grown = (1.0 + alike) / (1.0 - alike)
         covariance = inverse * max(sigma * sigma, variance) * grown * grown
-    near = 0
-    for row in rows:
-        near += row[1] <= reach
-    if n < 0.5 * near:
+    if n < 0.5 * np.sum(rows[:, 1] <= reach):
         return 0, plane, covariance
     plane[2] *= side
     covariance[2] *= side

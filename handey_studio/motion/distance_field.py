@@ -1,4 +1,9 @@
-"""A conservative distance field of the scene: at any point, a number that the distance to everything solid never falls below."""
+"""A conservative distance field of the scene: for any point, a number that the distance to everything solid never falls below.
+
+A convex body's distance from a voxel is at least its gap across any of the body's faces, and gaps across faces of mutually orthogonal
+directions add up like the sides of a right-angled triangle: for cuboids and prisms nothing is lost. The depth map's columns are filled
+in voxel by voxel and their distances swept along one axis after the other.
+"""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -6,20 +11,23 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
 
+from handey_studio.geometry import HeightField
 from handey_studio.world import World
 from handey_studio.world.collision import collision_model
-from handey_studio.world.collision_bodies import Obstacles
-from handey_studio.world.gjk import distance
+from handey_studio.world.collision_bodies import Obstacles, terrain_obstacles
 
-CLIP_M = 0.25  # farther than this nothing is told apart: more than a cell of the configuration space moves anything
+CLIP_M = 0.4  # farther than this nothing is told apart: more than a cell of the configuration space moves anything
 FINEST_M = 0.01
 MOST_VOXELS = 800_000
+ROUND_M = 0.1  # grids begin and end at multiples of this, so that worlds that differ in one part share theirs
 
 
 class Field(NamedTuple):
-    """`values[i, j, k]` [m] is the distance from the centre of a voxel, `cell` [m] wide, `low` (3,) the grid's lower corner, to the
-    nearest voxel that holds something, up to `clip`. The table and the walls of the free space `free` (2, 3) are planes apart from it.
+    """`values[i, j, k]` [m] is a lower bound of the distance between any point of a voxel, `cell` [m] wide, `low` (3,) the grid's lower
+    corner, and what is solid, up to `clip`. The table and the walls of the free space `free` (2, 3) are planes apart from it.
     """
 
     low: NDArray
@@ -30,25 +38,43 @@ class Field(NamedTuple):
     free: NDArray
 
 
+class Grid(NamedTuple):
+    """Voxels: lower corner (3,) [m], width [m], counts (3,)."""
+
+    low: tuple[float, ...]
+    cell: float
+    counts: tuple[int, ...]
+
+
 @lru_cache(maxsize=8)
-def distance_field(world: World) -> Field:
-    """The field of a world's blocks, parts and depth map, kept warm in this process."""
+def distance_field(world: World, reach: float) -> Field:
+    """The field of a world's blocks, parts and depth map as far as the arm with all that it carries may reach [m], kept in this process."""
     model = collision_model(world)
-    solids, terrain = model.solids, model.terrain
-    solid = np.arange(model.slabs, len(solids.name))
-    spans = [_spans(solids)[solid], _spans(terrain)]
-    boxes = np.concatenate(spans)
-    boxes[:, 0] = np.maximum(boxes[:, 0], [*world.free_space[0, :2], max(world.table_z, world.free_space[0, 2])])
-    boxes[:, 1] = np.minimum(boxes[:, 1], world.free_space[1])
+    grid = _grid(world, reach)
+    values = _terrain_distances(world.terrain, world.table_z, float(world.free_space[1, 2]), grid).copy()
+    low, solids = np.array(grid.low), model.solids
+    for k in range(model.slabs, len(solids.name)):
+        corners = solids.corners[solids.first[k] : solids.first[k + 1]]
+        planes, groups = faces_by_direction(corners)
+        _stamp(values, planes, groups, corners.min(axis=0), corners.max(axis=0), low, grid.cell, CLIP_M)
+    return Field(low, grid.cell, values, CLIP_M, float(world.table_z), np.array(world.free_space))
+
+
+def _grid(world: World, reach: float) -> Grid:
+    """The grid over all bodies but the table and the outside, as far as they matter, and `CLIP_M` around them."""
+    model, shoulder = collision_model(world), world.robot.T_world_base[:3, 3]
+    boxes = np.concatenate([_spans(model.solids)[model.slabs :], _spans(model.terrain)])
+    far = reach + CLIP_M
+    lowest = [*world.free_space[0, :2], max(world.table_z, world.free_space[0, 2])]
+    boxes[:, 0] = np.maximum(boxes[:, 0], np.maximum(shoulder - far, lowest))
+    boxes[:, 1] = np.minimum(boxes[:, 1], np.minimum(shoulder + far, world.free_space[1]))
     boxes = boxes[(boxes[:, 1] > boxes[:, 0]).all(axis=1)]
     if not len(boxes):
-        boxes = np.zeros((1, 2, 3))
-    low, high = boxes[:, 0].min(axis=0) - CLIP_M, boxes[:, 1].max(axis=0) + CLIP_M
+        return Grid((0.0, 0.0, 0.0), FINEST_M, (1, 1, 1))
+    low = np.floor((boxes[:, 0].min(axis=0) - CLIP_M) / ROUND_M) * ROUND_M
+    high = np.ceil((boxes[:, 1].max(axis=0) + CLIP_M) / ROUND_M) * ROUND_M
     cell = max(FINEST_M, float(np.cbrt(np.prod(high - low) / MOST_VOXELS)))
-    taken = np.zeros(np.ceil((high - low) / cell).astype(int), np.bool_)
-    _fill_columns(taken, _spans(terrain), low, cell)
-    _fill_bodies(taken, solids, solid, low, cell)
-    return Field(low, cell, box_distances(taken, cell, CLIP_M), CLIP_M, world.table_z, np.array(world.free_space))
+    return Grid(tuple(low.tolist()), cell, tuple(np.ceil((high - low) / cell).astype(int).tolist()))
 
 
 def _spans(fixed: Obstacles) -> NDArray:
@@ -59,64 +85,106 @@ def _spans(fixed: Obstacles) -> NDArray:
     return np.stack([np.minimum.reduceat(fixed.corners, starts), np.maximum.reduceat(fixed.corners, starts)], axis=1)
 
 
+def faces_by_direction(corners: NDArray) -> tuple[NDArray, NDArray]:
+    """Outward planes (f, 4) of the hull of corners (k, 3), n·x + d ≤ 0 inside, sorted into groups; where each begins and ends (g + 1,).
+
+    Directions of different groups are orthogonal: a cuboid has three, a prism two, most bodies one.
+    """
+    planes = np.unique(np.round(ConvexHull(corners).equations, 9), axis=0)
+    count, group = connected_components(np.abs(planes[:, :3] @ planes[:, :3].T) > 1e-9, directed=False)
+    order = np.argsort(group, kind="stable")
+    return np.ascontiguousarray(planes[order]), np.searchsorted(group[order], np.arange(count + 1))
+
+
+@njit(cache=True, fastmath=True)
+def _stamp(
+    values: NDArray, planes: NDArray, groups: NDArray, lower: NDArray, upper: NDArray, low: NDArray, cell: float, clip: float
+) -> None:
+    """Lowers the values to the distance from one convex body within `lower` to `upper`."""
+    first, last = np.zeros(3, np.int64), np.zeros(3, np.int64)
+    for axis in range(3):
+        first[axis] = max(int(np.floor((lower[axis] - clip - low[axis]) / cell)), 0)
+        last[axis] = min(int(np.floor((upper[axis] + clip - low[axis]) / cell)), values.shape[axis] - 1) + 1
+    n = last[2] - first[2]
+    if n <= 0:
+        return
+    heights = np.empty(n, np.float32)
+    for k in range(n):
+        heights[k] = low[2] + (first[2] + k + 0.5) * cell
+    squares, gap = np.empty(n, np.float32), np.empty(n, np.float32)
+    nothing, far = np.float32(0.0), np.float32(clip * clip)
+    for i in range(first[0], last[0]):
+        x = low[0] + (i + 0.5) * cell
+        for j in range(first[1], last[1]):
+            y = low[1] + (j + 0.5) * cell
+            squares[:] = nothing
+            for g in range(len(groups) - 1):
+                gap[:] = nothing
+                for f in range(groups[g], groups[g + 1]):
+                    a, b, c, d = planes[f]
+                    here = np.float32(a * x + b * y + d - 0.5 * cell * (abs(a) + abs(b) + abs(c)))
+                    slope = np.float32(c)
+                    for k in range(n):
+                        gap[k] = max(gap[k], here + slope * heights[k])
+                for k in range(n):
+                    squares[k] += gap[k] * gap[k]
+            row = values[i, j, first[2] : last[2]]
+            for k in range(n):
+                if squares[k] < far:
+                    row[k] = min(row[k], np.sqrt(squares[k]))
+
+
+@lru_cache(maxsize=4)
+def _terrain_distances(terrain: HeightField | None, table_z: float, ceiling: float, grid: Grid) -> NDArray:
+    """Distances (nx, ny, nz) float32 [m] from the depth map's columns, kept from world to world."""
+    values = np.full(grid.counts, CLIP_M, np.float32)
+    if terrain is None:
+        return values
+    tops = np.zeros(grid.counts[:2], np.int64)
+    _fill_columns(tops, grid.counts[2], _spans(terrain_obstacles(terrain, table_z, ceiling)), np.array(grid.low), grid.cell)
+    return column_distances(tops, grid.counts[2], grid.cell, CLIP_M)
+
+
 @njit(cache=True)
-def _fill_columns(taken: NDArray, spans: NDArray, low: NDArray, cell: float) -> None:
-    nx, ny, nz = taken.shape
+def _fill_columns(tops: NDArray, nz: int, spans: NDArray, low: NDArray, cell: float) -> None:
+    """How many voxels of each column (nx, ny) of the grid are solid, from below."""
+    nx, ny = tops.shape
     for s in range(len(spans)):
-        i0, i1 = int((spans[s, 0, 0] - low[0]) // cell), int((spans[s, 1, 0] - low[0]) // cell)
-        j0, j1 = int((spans[s, 0, 1] - low[1]) // cell), int((spans[s, 1, 1] - low[1]) // cell)
-        k1 = int((spans[s, 1, 2] - low[2]) // cell)
-        taken[max(i0, 0) : min(i1, nx - 1) + 1, max(j0, 0) : min(j1, ny - 1) + 1, : min(k1, nz - 1) + 1] = True
+        i0, i1 = int(np.floor((spans[s, 0, 0] - low[0]) / cell)), int(np.floor((spans[s, 1, 0] - low[0]) / cell))
+        j0, j1 = int(np.floor((spans[s, 0, 1] - low[1]) / cell)), int(np.floor((spans[s, 1, 1] - low[1]) / cell))
+        top = min(int(np.floor((spans[s, 1, 2] - low[2]) / cell)) + 1, nz)
+        for i in range(max(i0, 0), min(i1, nx - 1) + 1):
+            for j in range(max(j0, 0), min(j1, ny - 1) + 1):
+                tops[i, j] = max(tops[i, j], top)
 
 
-@njit(cache=True)
-def _fill_bodies(taken: NDArray, fixed: Obstacles, chosen: NDArray, low: NDArray, cell: float) -> None:
-    """Voxels that a convex body meets."""
-    voxel, first, last = np.empty((8, 3)), np.zeros(3, np.int64), np.zeros(3, np.int64)
-    for body in chosen:
-        a, b = int(fixed.first[body]), int(fixed.first[body + 1])
-        for axis in range(3):
-            first[axis] = max(int((fixed.corners[a:b, axis].min() - low[axis]) // cell), 0)
-            last[axis] = min(int((fixed.corners[a:b, axis].max() - low[axis]) // cell), taken.shape[axis] - 1)
-        for i in range(first[0], last[0] + 1):
-            for j in range(first[1], last[1] + 1):
-                for k in range(first[2], last[2] + 1):
-                    for c in range(8):
-                        voxel[c, 0] = low[0] + (i + (c & 1)) * cell
-                        voxel[c, 1] = low[1] + (j + ((c >> 1) & 1)) * cell
-                        voxel[c, 2] = low[2] + (k + ((c >> 2) & 1)) * cell
-                    taken[i, j, k] |= distance(voxel, 0, 8, fixed.corners, a, b, 1e-9) <= 0.0
+def column_distances(tops: NDArray, nz: int, cell: float, clip: float) -> NDArray:
+    """Distance [m] (nx, ny, nz) float32, up to `clip`, between each voxel and the nearest of columns `tops` (nx, ny) voxels high."""
+    above = np.maximum(np.arange(nz)[None, None] - tops[:, :, None], 0) * cell
+    squares = np.where(tops[:, :, None] > 0, np.minimum(above, clip) ** 2, clip * clip).astype(np.float32)
+    gaps = (np.arange(int(np.ceil(clip / cell)) + 1) * cell) ** 2
+    out = np.empty_like(squares)
+    _spread(squares, gaps.astype(np.float32), out)
+    swapped = np.ascontiguousarray(out.swapaxes(0, 1))
+    across = np.empty_like(swapped)
+    _spread(swapped, gaps.astype(np.float32), across)
+    return np.ascontiguousarray(np.sqrt(across.swapaxes(0, 1)))
 
 
-@njit(cache=True)
-def _sweep(squares: NDArray, reach: int, cell: float) -> NDArray:
-    """One axis (the last) of the distance transform: the least of each neighbour's square plus the gap's."""
-    nx, ny, nz = squares.shape
-    out = squares.copy()
-    for i in range(nx):
-        for j in range(ny):
-            for k in range(nz):
-                best = squares[i, j, k]
-                for step in range(1, reach + 1):
-                    gap = (step - 0.5) * cell
-                    if gap * gap >= best:
-                        break
-                    if k - step >= 0:
-                        best = min(best, squares[i, j, k - step] + gap * gap)
-                    if k + step < nz:
-                        best = min(best, squares[i, j, k + step] + gap * gap)
-                out[i, j, k] = best
-    return out
-
-
-def box_distances(taken: NDArray, cell: float, clip: float) -> NDArray:
-    """Exact distance [m] (float32) from each voxel's centre to the nearest taken voxel taken as a box, up to `clip`."""
-    squares = np.where(taken, 0.0, clip * clip)
-    reach = int(np.ceil(clip / cell)) + 1
-    for axis in (2, 1, 0):
-        turned = np.ascontiguousarray(np.moveaxis(squares, axis, -1))
-        squares = np.moveaxis(_sweep(turned, reach, cell), -1, axis)
-    return np.ascontiguousarray(np.sqrt(squares), dtype=np.float32)
+@njit(cache=True, fastmath=True)
+def _spread(squares: NDArray, gaps: NDArray, out: NDArray) -> None:
+    """The least of each neighbour's square along the first axis plus that of the gap between the two voxels."""
+    n, rows, nz = squares.shape
+    for i in range(n):
+        best = out[i]
+        best[:] = squares[i]
+        for step in range(-len(gaps), len(gaps) + 1):
+            if step == 0 or i + step < 0 or i + step >= n:
+                continue
+            gap, other = gaps[abs(step) - 1], squares[i + step]
+            for j in range(rows):
+                for k in range(nz):
+                    best[j, k] = min(best[j, k], other[j, k] + gap)
 
 
 @njit(cache=True)
@@ -124,10 +192,10 @@ def clearance_at(field: Field, x: float, y: float, z: float) -> float:
     """A lower bound [m] of the distance from a point to everything solid; at most `clip` away from the planes."""
     bound = min(z - field.table_z, x - field.free[0, 0], field.free[1, 0] - x, y - field.free[0, 1], field.free[1, 1] - y)
     bound = min(bound, z - field.free[0, 2], field.free[1, 2] - z)
-    u, v, w = (x - field.low[0]) / field.cell, (y - field.low[1]) / field.cell, (z - field.low[2]) / field.cell
-    i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
+    i = int(np.floor((x - field.low[0]) / field.cell))
+    j = int(np.floor((y - field.low[1]) / field.cell))
+    k = int(np.floor((z - field.low[2]) / field.cell))
     nx, ny, nz = field.values.shape
     if i < 0 or j < 0 or k < 0 or i >= nx or j >= ny or k >= nz:
         return min(bound, field.clip)
-    u, v, w = u - i - 0.5, v - j - 0.5, w - k - 0.5
-    return min(bound, field.values[i, j, k] - field.cell * np.sqrt(u * u + v * v + w * w))
+    return min(bound, field.values[i, j, k])

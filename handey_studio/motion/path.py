@@ -1,22 +1,34 @@
 """Collision-free, certified paths between two configurations (Handey 1987 §4)."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Silent
 from handey_studio.motion.certificate import Mover
+from handey_studio.motion.layers import layers_of
 from handey_studio.motion.query import PathOptions, Query, certify_runs, query
 from handey_studio.motion.random_trees import grow_trees
 from handey_studio.motion.results import CSpaceSummary, Leg, PathResult
-from handey_studio.motion.shortcut import cut_corners, without_idle_points
+from handey_studio.motion.shortcut import Route, shorten
 from handey_studio.motion.three_legs import three_legs
 from handey_studio.motion.wrist_ways import wrist_ways
 from handey_studio.world import Held, World
 from handey_studio.world.collision import Pairs
 
 STAGE = "path"
+
+
+class Attempt(NamedTuple):
+    """What one way of planning gave: what beyond the paper it `needed`, points (n, joints), their movers, the space; why it fell."""
+
+    needed: str
+    points: NDArray
+    movers: list[Mover]
+    space: CSpaceSummary | None
+    reason: str
 
 
 def plan_path(
@@ -33,12 +45,13 @@ def plan_path(
 ) -> PathResult:
     """A certified path from `start` to `goal` (joints,) [rad], with the fingers `opening` [m] apart around `held`.
 
-    The paper's three legs in the slice configuration space, with 5° cells, then finer ones; then with the home wrist in
-    between; then random trees over all joints. Pairs in `allowed_start` may touch on the leg that leaves the start, those in
-    `allowed_goal` on the leg that arrives at the goal. No path found comes back as status "none" with every attempt in `entries`.
-    Without `rng` the trees are drawn from seed 0.
+    Straight, if that is free. Else the paper's three legs in the slice configuration space; a layer of it for the wrist at each end;
+    other ways of the wrist; finer cells; and at last random trees over all joints. `needed` of the result tells.
+
+    Pairs in `allowed_start` may touch on the leg that leaves the start, those in `allowed_goal` on the leg that arrives at the goal. No
+    path found comes back as status "none" with every attempt in `entries`. Without `rng` short cuts and trees are drawn from seed 0.
     """
-    options, progress = options or PathOptions(), progress or Silent()
+    options, progress, rng = options or PathOptions(), progress or Silent(), rng or np.random.default_rng(0)
     asked, reason, worst = query(world, start, goal, opening, held, allowed_start, allowed_goal, options)
     ledger = Ledger()
     if reason:
@@ -46,11 +59,11 @@ def plan_path(
         ledger.add(STAGE, "ends", reason, value=value, limit=0.0, unit="m", bodies=bodies)
         return PathResult("none", reason, np.empty((0, len(world.robot.lower))), entries=ledger.entries)
     space: CSpaceSummary | None = None
-    for needed, points, movers, seen, why in _attempts(asked, rng or np.random.default_rng(0), progress):
-        space = seen if len(points) or space is None else space
-        entry = ledger.add(STAGE, needed or "three legs", why or None)
-        if len(points):
-            result = _finished(asked, points, movers, needed, ledger, entry, space)
+    for attempt in _attempts(asked, rng, progress):
+        space = attempt.space if len(attempt.points) or space is None else space
+        entry = ledger.add(STAGE, attempt.needed or "three legs", attempt.reason or None)
+        if len(attempt.points):
+            result = _finished(asked, attempt, space, ledger, entry, rng)
             if result is not None:
                 return result
         if progress.cancelled:
@@ -59,41 +72,46 @@ def plan_path(
     return PathResult("none", "; ".join(reasons), np.empty((0, len(asked.start))), entries=ledger.entries, space=space)
 
 
-Attempt = tuple[str, NDArray, list[Mover], CSpaceSummary | None, str]
-
-
 def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Iterator[Attempt]:
-    """What is tried, one after the other: what beyond the paper it needed, its points, their movers, the space, why it fell."""
-    steps = asked.options.steps_deg
+    """What is tried, one after the other."""
+    nothing = np.empty((0, len(asked.start)))
+    if asked.options.straight and asked.free.moves(asked.start, asked.goal):
+        yield Attempt("straight", np.array([asked.start, asked.goal]), [asked.free], None, "")
     ways = wrist_ways(asked, rng, 2)
-    plans = [(wrists, step, name) for step in steps for name, wrists in ways]
     if not ways:
-        yield "wrist", np.empty((0, len(asked.start))), [], None, "the wrist finds no way to turn that keeps the hand off the arm"
-    for k, (wrists, step, name) in enumerate(plans):
+        yield Attempt("wrist", nothing, [], None, "the wrist finds no way to turn that keeps the hand off the arm")
+    plans = [(step, name, stack) for step in asked.options.steps_deg for name, way in ways for stack in _stacks(way)]
+    for k, (step, name, (stacked, ways_of_layers)) in enumerate(plans):
         progress.report(k / (len(plans) + 1), f"configuration space of the arm joints, {step:g}° cells")
-        found = three_legs(asked, wrists, float(np.deg2rad(step)), fine=True)
-        needed = ", ".join(word for word in (name, f"{step:g}° cells" if step != steps[0] else "") if word)
-        yield needed, found.points, found.movers, found.space, found.reason
+        found = three_legs(asked, layers_of(asked, ways_of_layers, float(np.deg2rad(step))))
+        cells = f"{step:g}° cells" if step != asked.options.steps_deg[0] else ""
+        needed = ", ".join(word for word in (name, stacked, cells) if word)
+        yield Attempt(needed, found.points, found.movers, found.space, found.reason)
     points, movers, growths = grow_trees(asked, rng, progress)
     why = "" if len(points) else f"random trees did not meet in {growths} growths"
-    yield f"random trees, {growths} growths", points, movers, None, why
+    yield Attempt(f"random trees, {growths} growths", points, movers, None, why)
+
+
+def _stacks(way: NDArray) -> list[tuple[str, list[NDArray]]]:
+    """The layers for one way of the wrist: the paper's one box; and the wrist as it is at both ends in layers of their own."""
+    return [("", [way]), ("a layer for each end", [way[:1], way, way[-1:]])]
 
 
 def _finished(
-    asked: Query, points: NDArray, movers: list[Mover], needed: str, ledger: Ledger, entry: int, space: CSpaceSummary | None
+    asked: Query, found: Attempt, space: CSpaceSummary | None, ledger: Ledger, entry: int, rng: np.random.Generator
 ) -> PathResult | None:
-    """The path with its corners cut and its certificate; None, with the reason in the ledger, when the proof of the whole fails."""
-    points, movers = cut_corners(points, movers, asked.free, asked.options.cut_rounds)
-    points, movers = without_idle_points(points, movers)
-    if not movers:
-        points, movers = np.array([asked.start, asked.goal]), [asked.leaving]
-    certificate = certify_runs(points, movers)
+    """The path shortened and with its certificate; None, with the reason in the ledger, when the proof of the whole fails."""
+    route = shorten(Route(found.points, tuple(found.movers)), asked.free, asked.options.shortcuts, rng)
+    if not route.movers:
+        route = Route(np.array([asked.start, asked.goal]), (asked.leaving,))
+    certificate = certify_runs(route.points, list(route.movers))
     if not certificate.proved:
         ledger.fall(
             entry, certificate.reason, value=certificate.least_clearance, limit=certificate.margin, unit="m", bodies=certificate.bodies
         )
         return None
-    return PathResult("found", "", points, certificate, _legs(points, asked.world.robot.other_index), needed, ledger.entries, space)
+    legs = _legs(route.points, asked.world.robot.other_index)
+    return PathResult("found", "", route.points, certificate, legs, found.needed, ledger.entries, space)
 
 
 def _legs(points: NDArray, others: NDArray) -> tuple[Leg, ...]:

@@ -17,17 +17,18 @@ class PathOptions:
     """What the path planner tries. Work is counted, never timed.
 
     `margin_m` what free motion keeps from everything; nearer an end that is closer already, half of that end's clearance.
+    `straight` whether the straight way is looked at before a space is built.
     `steps_deg` widths of the cells, tried in turn; each divides a turn. `regions` free regions tried a space,
-    `fine_expansions` nodes of the finer grid around an end, `repairs` searches after the whole arm failed in some cells,
-    `cut_rounds` rounds of corner cutting, `tree_growths` extensions of the random trees, the last resort.
+    `repairs` searches after the whole arm failed in some cells, `shortcuts` random short cuts tried,
+    `tree_growths` extensions of the random trees, the last resort.
     """
 
     margin_m: float = MARGIN_M
     steps_deg: tuple[float, ...] = (5.0, 2.5)
     regions: int = 2
-    fine_expansions: int = 150
     repairs: int = 8
-    cut_rounds: int = 3
+    straight: bool = True
+    shortcuts: int = 40
     tree_growths: int = 1500
 
 

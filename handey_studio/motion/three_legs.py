@@ -2,23 +2,23 @@
 wrist turns, and from the free cell nearest the goal to the goal with the wrist as it is there."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.motion.certificate import Mover
-from handey_studio.motion.configuration_space import ConfigurationSpace, configuration_space
+from handey_studio.motion.layers import Layers
 from handey_studio.motion.legs import leg_to_free
 from handey_studio.motion.query import Query
 from handey_studio.motion.results import CSpaceSummary
-from handey_studio.motion.search import find_cells, regions_by_distance
-from handey_studio.motion.wrist_box import ArmSpheres, arm_spheres
-from handey_studio.world import Robot
+from handey_studio.motion.search import find_cells
 
 
 @dataclass(frozen=True, eq=False)
 class ThreeLegs:
-    """What one space gave: the path's points (n, joints) [rad] and the mover of each segment, empty when it gave none; `reason` why."""
+    """What one stack of spaces gave: the path's points (n, joints) [rad] and the mover of each segment, empty when none; `reason` why."""
 
     points: NDArray
     movers: list[Mover]
@@ -26,78 +26,124 @@ class ThreeLegs:
     space: CSpaceSummary
 
 
-def three_legs(query: Query, wrists: NDArray, step: float, fine: bool) -> ThreeLegs:
-    """The three legs in the space with cells `step` [rad] wide, while the joints other than the arm's run through `wrists`
-    (m, joints − 3) [rad] from start to goal.
-
-    `fine`: whether the finer grid is used near an end that no straight line leads away from.
-    """
-    spheres = arm_spheres(query.world.robot, wrists, query.opening, query.held)
-    middle = wrists[len(wrists) // 2] if len(wrists) > 2 else wrists.mean(axis=0)
-    space = configuration_space(query.free, spheres, middle, step, np.array([query.start, query.goal]))
-    regions = regions_by_distance(space, query.start, query.goal, query.options.regions)
-    reason = "no cell of the space is free" if not regions else ""
-    expansions = query.options.fine_expansions if fine else 0
+def three_legs(query: Query, layers: Layers) -> ThreeLegs:
+    """The three legs in a stack of spaces."""
+    regions = layers.common_regions(query.start, query.goal, query.options.regions)
+    reason = "" if regions else "no free region holds the wrist as it is at both ends"
     for region in regions:
-        first = leg_to_free(query.leaving, space, query.start, region, expansions)
-        last = leg_to_free(query.arriving, space, query.goal, region, expansions) if first else None
+        first = leg_to_free(query.leaving, layers, 0, query.start, region)
+        last = leg_to_free(query.arriving, layers, len(layers.spaces) - 1, query.goal, region) if first else None
         if first is None or last is None:
             reason = reason or f"the {'start' if first is None else 'goal'} does not reach the free cells nearest to it"
             continue
-        between, cells = _free_leg(query, space, region, wrists, first[1], last[1])
+        between, cells = _free_leg(query, layers, first[1], last[1])
         if not len(between):
             reason = reason or "the whole arm fails in the cells that its model with the wrist box calls free"
             continue
         points = np.concatenate([first[0], between[1:], last[0][::-1][1:]])
-        movers = [query.leaving] * (len(first[0]) - 1) + [query.free] * (len(between) - 1) + [query.arriving] * (len(last[0]) - 1)
-        return ThreeLegs(points, movers, "", summary(space, spheres, cells, first[1], last[1]))
-    return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(space, spheres, np.empty((0, 3)), None, None))
+        movers = [query.leaving, *[query.free] * (len(between) - 1), query.arriving]
+        return ThreeLegs(points, movers, "", summary(layers, cells))
+    return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(layers, np.empty((0, 4))))
 
 
-def _free_leg(
-    query: Query, space: ConfigurationSpace, region: int, wrists: NDArray, first: tuple[int, int, int], last: tuple[int, int, int]
-) -> tuple[NDArray, NDArray]:
-    """Points (n, joints) of the free leg, proved for the whole arm, and its cells (k, 3); both empty when there is none.
+def _free_leg(query: Query, layers: Layers, first: NDArray, last: NDArray) -> tuple[NDArray, NDArray]:
+    """Points (n, joints) of the free leg, proved for the whole arm, and its cells (k, 4); both empty when there is none.
 
     The cells answer for the scene. Where the arm's own bodies come too close the cells are taken out and the way is searched anew.
     """
-    blocked = space.regions != region
+    blocked = layers.blocked
     for _ in range(query.options.repairs):
         cells = find_cells(blocked, first, last)
         if not len(cells):
             break
-        points, owners = _with_wrist(query.world.robot, space.centre(cells), wrists)
-        bad = [k for k in range(len(points) - 1) if not query.free.moves(points[k], points[k + 1])]
+        corners = pulled(blocked, cells)
+        points, owners = _with_wrist(query, layers, cells[corners])
+        bad = [k for k, (a, b) in enumerate(pairwise(points)) if not query.free.moves(a, b)]
+        if bad and len(corners) < len(cells):
+            corners = np.arange(len(cells))
+            points, owners = _with_wrist(query, layers, cells)
+            bad = [k for k, (a, b) in enumerate(pairwise(points)) if not query.free.moves(a, b)]
         if not bad:
             return points, cells
-        out = {tuple(int(c) for c in cells[min(owners[k] + side, len(cells) - 1)]) for k in bad for side in (0, 1)} - {first, last}
+        out = {tuple(cells[corners[owners[k + side]]].tolist()) for k in bad for side in (0, 1)}
+        out -= {tuple(first.tolist()), tuple(last.tolist())}
         if not out:
             break
-        for cell in out:
-            blocked[cell] = True
-    return np.empty((0, len(query.start))), np.empty((0, 3))
+        blocked = np.array(blocked)
+        blocked[tuple(np.array(list(out)).T)] = True
+    return np.empty((0, len(query.start))), np.empty((0, 4))
 
 
-def _with_wrist(robot: Robot, arm: NDArray, wrists: NDArray) -> tuple[NDArray, NDArray]:
-    """The arm's corners (k, 3) and the wrist's (m, joints − 3) run through together, each at an even pace: configurations (n, joints).
+def pulled(blocked: NDArray, cells: NDArray) -> NDArray:
+    """Numbers of the cells (k, 4) that are left as corners when the way is pulled straight through free cells of its layer."""
+    corners = [0]
+    while corners[-1] < len(cells) - 1:
+        corners.append(int(_farthest(blocked, cells, corners[-1])))
+    return np.array(corners)
 
-    Also the arm corner before each point.
+
+@njit(cache=True)
+def _farthest(blocked: NDArray, cells: NDArray, start: int) -> int:
+    """The last cell up to which all are seen from cell `start`; at least the next one."""
+    end = start + 1
+    while end + 1 < len(cells) and cells[end + 1, 0] == cells[start, 0]:
+        longest = 0.0
+        for axis in range(1, 4):
+            longest = max(longest, abs(float(cells[end + 1, axis] - cells[start, axis])))
+        looks = 4 * int(longest)
+        for look in range(1, looks):
+            t = look / looks
+            i = int(np.round(cells[start, 1] + t * (cells[end + 1, 1] - cells[start, 1])))
+            j = int(np.round(cells[start, 2] + t * (cells[end + 1, 2] - cells[start, 2])))
+            k = int(np.round(cells[start, 3] + t * (cells[end + 1, 3] - cells[start, 3])))
+            if blocked[cells[start, 0], i, j, k]:
+                return end
+        end += 1
+    return end
+
+
+def _with_wrist(query: Query, layers: Layers, cells: NDArray) -> tuple[NDArray, NDArray]:
+    """Points (n, joints) of arm and wrist along cells (k, 4), and the number (n,) of the cell at or before each.
+
+    In each layer the wrist runs at an even pace through the layer's way.
     """
-    arm = np.repeat(arm, 2, axis=0) if len(arm) == 1 else arm
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(arm, axis=0), axis=1))])
-    at_arm = along / along[-1] if along[-1] > 0 else np.linspace(0.0, 1.0, len(arm))
-    at_wrist = np.linspace(0.0, 1.0, len(wrists))
-    t = np.unique(np.concatenate([at_arm, at_wrist]))
-    points = np.empty((len(t), len(robot.joint_names)))
-    points[:, robot.arm_index] = np.stack([np.interp(t, at_arm, column) for column in arm.T], axis=1)
-    points[:, robot.other_index] = np.stack([np.interp(t, at_wrist, column) for column in wrists.T], axis=1)
-    return points, np.searchsorted(at_arm, t, side="right") - 1
+    robot, space = query.world.robot, layers.spaces[0]
+    runs, owners = [], []
+    for layer, box in enumerate(layers.boxes):
+        mine = np.flatnonzero(cells[:, 0] == layer)
+        arm, wrists = space.centre(cells[mine, 1:]), box.wrists
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(arm, axis=0), axis=1))])
+        if along[-1] == 0.0 and len(wrists) > 1:
+            arm, along, mine = np.repeat(arm[:1], 2, axis=0), np.array([0.0, 1.0]), np.repeat(mine[:1], 2)
+        at_arm = along / along[-1] if along[-1] > 0 else np.zeros(len(arm))
+        at_wrist = np.linspace(0.0, 1.0, len(wrists)) if len(wrists) > 1 else np.zeros(1)
+        t = np.unique(np.concatenate([at_arm, at_wrist]))
+        points = np.empty((len(t), len(query.start)))
+        for k, joint in enumerate(robot.arm_index):
+            points[:, joint] = np.interp(t, at_arm, arm[:, k])
+        for k, joint in enumerate(robot.other_index):
+            points[:, joint] = np.interp(t, at_wrist, wrists[:, k])
+        runs.append(points)
+        owners.append(mine[np.searchsorted(at_arm, t, side="right") - 1])
+    points, owner = np.concatenate(runs), np.concatenate(owners)
+    keep = np.r_[True, np.abs(np.diff(points, axis=0)).max(axis=1) > 0.0]
+    return points[keep], owner[keep]
 
 
-def summary(
-    space: ConfigurationSpace, spheres: ArmSpheres, cells: NDArray, first: tuple[int, ...] | None, last: tuple[int, ...] | None
-) -> CSpaceSummary:
-    """The space as it is drawn."""
-    joints = (int(space.joints[0]), int(space.joints[1]), int(space.joints[2]))
-    regions = int(space.regions.max())
-    return CSpaceSummary(space.step, space.centres, space.blocked, cells, first, last, spheres.box, spheres.carrier, regions, joints)
+def summary(layers: Layers, cells: NDArray) -> CSpaceSummary:
+    """The space as it is drawn: the layer in which the wrist turns farthest, and the cells in all layers."""
+    turning = int(np.argmax([np.abs(np.diff(box.wrists, axis=0)).sum() for box in layers.boxes]))
+    space, box = layers.spaces[turning], layers.boxes[turning]
+    ends = [tuple(int(c) for c in cells[k][1:]) for k in (0, -1)] if len(cells) else [None, None]
+    return CSpaceSummary(
+        step_rad=space.extent.step,
+        centres=space.extent.centres,
+        blocked=space.blocked,
+        path_cells=cells[:, 1:],
+        start_cell=ends[0],
+        goal_cell=ends[1],
+        wrist_box=box.corners,
+        wrist_box_link=box.carrier,
+        regions=layers.regions.count,
+        joints=tuple(int(joint) for joint in space.joints),
+    )

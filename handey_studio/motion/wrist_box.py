@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import manifold3d
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
@@ -29,47 +30,49 @@ Balls = tuple[NDArray, NDArray]  # centres (k, 3), radii (k,) [m]
 
 
 @dataclass(frozen=True, eq=False)
-class ArmSpheres(Value):
-    """Spheres that enclose the arm: `centres` (k, 3) [m] in the frame of link `links` (k,), `radii` (k,) [m].
+class WristBox(Value):
+    """The box that stands for wrist, hand and part, filled with balls: `centres` (k, 3), `radii` (k,) [m] in the frame of link `carrier`.
 
-    `box` (8, 3) [m] are the corners of the wrist box in the frame of link `carrier`, the last one that has spheres. They hold while the
-    joints other than the arm's stay within `ranges` (2, joints − 3) [rad].
+    `corners` (8, 3) [m] are the box's. It holds while the joints other than the arm's run through `wrists` (m, joints − 3) [rad].
     """
 
     centres: NDArray
     radii: NDArray
-    links: NDArray
-    box: NDArray
+    corners: NDArray
     carrier: int
-    ranges: NDArray
+    wrists: NDArray
 
     def __post_init__(self) -> None:
-        for key, dtype in (("centres", float), ("radii", float), ("links", int), ("box", float), ("ranges", float)):
-            object.__setattr__(self, key, frozen_array(getattr(self, key), dtype))
+        for key in ("centres", "radii", "corners", "wrists"):
+            object.__setattr__(self, key, frozen_array(getattr(self, key), float))
 
 
-def arm_spheres(robot: Robot, wrists: NDArray, opening: float, held: Held | None) -> ArmSpheres:
-    """The spheres of the arm while its other joints run joint-linearly through `wrists` (m, joints − 3) [rad].
+def wrist_box(robot: Robot, wrists: NDArray, opening: float, held: Held | None) -> WristBox:
+    """The wrist box while the joints other than the arm's run joint-linearly through `wrists` (m, joints − 3) [rad].
 
     The fingers are `opening` [m] apart.
     """
-    centres, radii, links = [], [], []
-    for piece, (c, r) in _robot_balls(robot):
-        if 1 <= piece.link <= robot.carrier:
-            centres.append(c)
-            radii.append(r)
-            links.append(np.full(len(r), piece.link))
     carried = [pair for pair in _robot_balls(robot) if pair[0].link > robot.carrier] + (list(_held_balls(robot, held)) if held else [])
-    swept, corners = sweep(robot, carried, wrists, opening)
-    for size in BALL_SIZES_M:
-        c, r = gather(*swept, size)
-        if len(r) <= MOST_BALLS:
+    (points, sizes), ends = sweep(robot, carried, wrists, opening)
+    low, high = points.min(axis=0), points.max(axis=0)
+    centres, radii, _ = gather(points, sizes, low, high, BALL_SIZES_M[0])
+    for size in BALL_SIZES_M[1:]:
+        if len(radii) <= MOST_BALLS:
             break
+        centres, radii, _ = gather(points, sizes, low, high, size)
     pick = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
-    box = np.where(pick, corners.max(axis=0) + SWEEP_M / 2, corners.min(axis=0) - SWEEP_M / 2)
-    on = np.concatenate([*links, np.full(len(r), robot.carrier)])
-    ranges = np.array([wrists.min(axis=0), wrists.max(axis=0)])
-    return ArmSpheres(np.concatenate([*centres, c]), np.concatenate([*radii, r]), on, box, robot.carrier, ranges)
+    return WristBox(centres, radii, np.where(pick, ends[1], ends[0]), robot.carrier, wrists)
+
+
+@lru_cache(maxsize=8)
+def link_balls(robot: Robot) -> tuple[NDArray, NDArray, NDArray]:
+    """Balls that enclose the links up to the carrier: centres (k, 3) and radii (k,) [m], and the link (k,) in whose frame they are."""
+    mine = [(piece.link, balls) for piece, balls in _robot_balls(robot) if 1 <= piece.link <= robot.carrier]
+    return (
+        np.concatenate([centres for _, (centres, _) in mine]),
+        np.concatenate([radii for _, (_, radii) in mine]),
+        np.concatenate([np.full(len(radii), link) for link, (_, radii) in mine]),
+    )
 
 
 @lru_cache(maxsize=8)
@@ -100,21 +103,40 @@ def dice(corners: NDArray, size: float) -> Balls:
     return centres, radii
 
 
-def gather(points: NDArray, sizes: NDArray, size: float) -> Balls:
-    """Bigger balls, each around those whose centres lie in one cube about `size` wide."""
-    low, extent = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-9)
-    counts = np.maximum(np.ceil(extent / size).astype(int), 1)
-    index = np.minimum((points - low) / (extent / counts), counts - 1).astype(int)
-    order = np.lexsort(index.T[::-1])
-    first = np.flatnonzero(np.r_[True, (np.diff(index[order], axis=0) != 0).any(axis=1)])
-    groups = np.repeat(np.arange(len(first)), np.diff(np.r_[first, len(points)]))
-    centres = (np.minimum.reduceat(points[order], first) + np.maximum.reduceat(points[order], first)) / 2
-    radii = np.maximum.reduceat(np.linalg.norm(points[order] - centres[groups], axis=1) + sizes[order], first)
-    return centres, radii
+@njit(cache=True)
+def gather(points: NDArray, sizes: NDArray, low: NDArray, high: NDArray, size: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Bigger balls, each around those balls, `points` (k, 3) and `sizes` (k,), whose centres lie in one cube about `size` wide.
+
+    All centres lie within `low` to `high` (3,). Centres (b, 3) and radii (b,) of the bigger balls, and in which one (k,) each ball is.
+    """
+    counts, width = np.empty(3, np.int64), np.empty(3)
+    for axis in range(3):
+        counts[axis] = max(int(np.ceil((high[axis] - low[axis]) / size)), 1)
+        width[axis] = max(high[axis] - low[axis], 1e-9) / counts[axis]
+    cubes = counts[0] * counts[1] * counts[2]
+    number, cube_of, found = np.full(cubes, -1), np.empty(len(points), np.int64), 0
+    lower, upper = np.full((cubes, 3), np.inf), np.full((cubes, 3), -np.inf)
+    for p in range(len(points)):
+        cube = 0
+        for axis in range(3):
+            cube = cube * counts[axis] + min(int((points[p, axis] - low[axis]) / width[axis]), counts[axis] - 1)
+        if number[cube] < 0:
+            number[cube] = found
+            found += 1
+        cube_of[p] = number[cube]
+        for axis in range(3):
+            lower[cube_of[p], axis] = min(lower[cube_of[p], axis], points[p, axis])
+            upper[cube_of[p], axis] = max(upper[cube_of[p], axis], points[p, axis])
+    centres, radii = (lower[:found] + upper[:found]) / 2, np.zeros(found)
+    for p in range(len(points)):
+        c = cube_of[p]
+        x, y, z = points[p, 0] - centres[c, 0], points[p, 1] - centres[c, 1], points[p, 2] - centres[c, 2]
+        radii[c] = max(radii[c], np.sqrt(x * x + y * y + z * z) + sizes[p])
+    return centres, radii, cube_of
 
 
 def sweep(robot: Robot, carried: list[tuple[Piece, Balls]], wrists: NDArray, opening: float) -> tuple[Balls, NDArray]:
-    """Balls, and corners (k, 3) [m], in the carrier's frame, of all that the wrist carries at postures close enough together."""
+    """Balls, and the lower and upper corner (2, 3) [m] of the box, in the carrier's frame, of all that the wrist carries on its way."""
     arm = arm_of(robot)
     far = max(float(np.linalg.norm(piece.corners, axis=1).max()) for piece, _ in carried) + opening
     postures = _postures(wrists, SWEEP_M / (far + np.linalg.norm(arm.T_links[robot.carrier + 1 :, :3, 3], axis=1).sum()))
@@ -123,13 +145,28 @@ def sweep(robot: Robot, carried: list[tuple[Piece, Balls]], wrists: NDArray, ope
     poses = arm.link_poses(q)
     Ts = inverse(poses[:, robot.carrier : robot.carrier + 1]) @ poses
 
-    def everywhere(piece: Piece, points: NDArray) -> NDArray:
-        T = Ts[:, piece.link]
-        return (np.einsum("nij,kj->nki", T[:, :3, :3], points + piece.slide * opening) + T[:, None, :3, 3]).reshape(-1, 3)
+    def everywhere(points: list[NDArray]) -> NDArray:
+        links = np.concatenate([np.full(len(p), piece.link) for p, (piece, _) in zip(points, carried, strict=True)])
+        slid = np.concatenate([p + piece.slide * opening for p, (piece, _) in zip(points, carried, strict=True)])
+        return _everywhere(Ts, links, slid)
 
-    centres = np.concatenate([everywhere(piece, c) for piece, (c, _) in carried])
-    radii = np.concatenate([np.tile(r, len(postures)) for _, (_, r) in carried])
-    return (centres, radii + SWEEP_M / 2), np.concatenate([everywhere(piece, piece.corners) for piece, _ in carried])
+    centres = everywhere([c for _, (c, _) in carried])
+    radii = np.tile(np.concatenate([r for _, (_, r) in carried]), len(postures))
+    corners = everywhere([piece.corners for piece, _ in carried])
+    return (centres, radii + SWEEP_M / 2), np.array([corners.min(axis=0) - SWEEP_M / 2, corners.max(axis=0) + SWEEP_M / 2])
+
+
+@njit(cache=True)
+def _everywhere(Ts: NDArray, links: NDArray, points: NDArray) -> NDArray:
+    """Points (k, 3), each on its link, at all n postures: (n·k, 3)."""
+    n, k = len(Ts), len(points)
+    out = np.empty((n * k, 3))
+    for posture in range(n):
+        for p in range(k):
+            T = Ts[posture, links[p]]
+            for axis in range(3):
+                out[posture * k + p, axis] = T[axis, 0] * points[p, 0] + T[axis, 1] * points[p, 1] + T[axis, 2] * points[p, 2] + T[axis, 3]
+    return out
 
 
 def _postures(wrists: NDArray, step: float) -> NDArray:

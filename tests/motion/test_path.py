@@ -6,7 +6,21 @@ import pytest
 from handey_studio.base import BadInput
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import transform
-from handey_studio.motion import PathOptions, certify, configuration_space, distance_field, plan_path, proof, search, straight_path, warm_up
+from handey_studio.motion import (
+    PathOptions,
+    certify,
+    distance_field,
+    forbidden,
+    plan_path,
+    proof,
+    regions,
+    search,
+    self_collision,
+    straight_path,
+    three_legs,
+    warm_up,
+    wrist_box,
+)
 from handey_studio.world import Block, Held, Part, World, arm_of, collision_queries, gjk
 from handey_studio.world.collision import collision_model
 from tests.motion.oracle import DOWN, ROBOT, Judge, reach, scene
@@ -217,6 +231,6 @@ def test_warmed_up_nothing_is_left_to_compile():
 
 def _signatures() -> dict[str, int]:
     """Compiled versions of each function of collision and motion."""
-    modules = (gjk, collision_queries, proof, configuration_space, distance_field, search)
+    modules = (gjk, collision_queries, proof, forbidden, distance_field, search, regions, self_collision, three_legs, wrist_box)
     functions = [(m.__name__, f) for m in modules for f in vars(m).values() if hasattr(f, "signatures") and f.__module__ == m.__name__]
     return {f"{name}.{f.__name__}": len(f.signatures) for name, f in functions}

@@ -1,0 +1,51 @@
+"""Configuration spaces on top of one another, one for each stretch of the wrist's way (after Handey 1987 §4).
+
+In the paper one box holds the wrist at the start, at the goal and in between, and the legs to it are planned apart. With a layer for each
+stretch, the wrist as it is at the start, turning, and as it is at the goal, one search finds all: from one layer to the next the arm goes
+where both are free. More layers make each box smaller.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Value
+from handey_studio.motion.configuration_space import ConfigurationSpace, configuration_space, extent_around
+from handey_studio.motion.query import Query
+from handey_studio.motion.regions import Regions, free_regions, region_distances
+from handey_studio.motion.wrist_box import WristBox, wrist_box
+
+
+@dataclass(frozen=True, eq=False)
+class Layers(Value):
+    """Spaces of one extent and the wrist boxes that they are for; each box's way begins where that of the layer before ends."""
+
+    boxes: tuple[WristBox, ...]
+    spaces: tuple[ConfigurationSpace, ...]
+
+    @cached_property
+    def blocked(self) -> NDArray:
+        """Cells (layers, n1, n2, n3)."""
+        return np.stack([space.blocked for space in self.spaces])
+
+    @cached_property
+    def regions(self) -> Regions:
+        """The free regions of all layers together."""
+        return free_regions(self.blocked)
+
+    def common_regions(self, start: NDArray, goal: NDArray, most: int) -> list[int]:
+        """Regions that are in the first layer and in the last, those that come nearest to start and goal (n,) together first."""
+        first = region_distances(self.regions, 0, self.spaces[0].place(start))
+        total = first + region_distances(self.regions, len(self.spaces) - 1, self.spaces[-1].place(goal))
+        order = np.argsort(total, kind="stable")[:most]
+        return [int(k) + 1 for k in order if np.isfinite(total[k])]
+
+
+def layers_of(query: Query, ways: list[NDArray], step: float) -> Layers:
+    """A layer for each stretch (m, joints − 3) [rad] of the wrist's way, with cells `step` [rad] wide."""
+    robot = query.world.robot
+    extent = extent_around(robot, step, np.array([query.start, query.goal]))
+    boxes = tuple(wrist_box(robot, way, query.opening, query.held) for way in ways)
+    return Layers(boxes, tuple(configuration_space(query.free, box, extent) for box in boxes))
