@@ -8,9 +8,11 @@ from handey_studio.localization.edges import JUMP
 from handey_studio.localization.flanks import Seen, w_of
 from handey_studio.localization.lines import Line, crease, silhouette
 from handey_studio.localization.runs import MIN_PIXELS, axis_of
+from handey_studio.localization.shares import shared
 from handey_studio.localization.surface import reading_sigma
 
 MAX_BENDS = 4  # rounds of cutting a segment in two
+LEAST_PIECES = 10  # that are worth a share
 SMOOTH = 3  # readings on either side that a reading's median is taken over
 
 
@@ -25,11 +27,22 @@ def straight_lines(
         return (), numbers
     start = np.r_[np.nonzero(np.diff(segment[order], prepend=-1))[0], len(order)]
     start = unbent(seen, u, v, order, start)
-    lines = fitted(seen, outward, kind, u, v, order, start)
+    lines = _in_shares(seen, outward, kind, u, v, order, start)
     kept = [k for k, line in enumerate(lines) if line.pixels]
     for number, k in enumerate(kept):
         numbers[order[start[k] : start[k + 1]]] = number
     return tuple(lines[k] for k in kept), numbers
+
+
+def _in_shares(seen: Seen, outward: NDArray, kind: NDArray, u: NDArray, v: NDArray, order: NDArray, start: NDArray) -> list[Line]:
+    """The line of each piece, some at a time on each core."""
+    found: dict[int, list[Line]] = {}
+
+    def work(first: int, last: int) -> None:
+        found[first] = fitted(seen, outward, kind, u, v, order, start[first : last + 1])
+
+    shared(work, len(start) - 1, LEAST_PIECES)
+    return [line for first in sorted(found) for line in found[first]]
 
 
 @njit(cache=True)
@@ -93,7 +106,7 @@ def unbent(seen: Seen, u: NDArray, v: NDArray, order: NDArray, start: NDArray) -
     return out[: n + 1]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def fitted(seen: Seen, outward: NDArray, kind: NDArray, u: NDArray, v: NDArray, order: NDArray, start: NDArray) -> list[Line]:
     """The line of each piece."""
     lines = []

@@ -87,17 +87,19 @@ def data_edges(view: DepthView, surface: Surface, edges: EdgePixels, linked: Lin
     """Segments of at least `min_length` [m] in space, longest first."""
     kinds = np.zeros(len(linked.lines), dtype=np.int64)
     kinds[linked.segment[linked.segment >= 0]] = linked.kind[linked.segment >= 0]
-    found = [_data_edge(view, int(kind), line) for kind, line in zip(kinds, linked.lines, strict=True)]
-    return tuple(sorted((edge for edge in found if edge.length >= min_length), key=lambda edge: -edge.length))
+    ends = np.array([line.ends for line in linked.lines]).reshape(-1, 2, 3)
+    ends_world = ends @ view.T_world_sensor[:3, :3].T + view.T_world_sensor[:3, 3]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    longest_first = [int(k) for k in np.argsort(-lengths, kind="stable") if lengths[k] >= min_length]
+    return tuple(_data_edge(KIND_NAMES[kinds[k]], linked.lines[k], ends_world[k]) for k in longest_first)
 
 
-def _data_edge(view: DepthView, kind: int, line: Line) -> DataEdge:
-    ends_world = line.ends @ view.T_world_sensor[:3, :3].T + view.T_world_sensor[:3, 3]
+def _data_edge(kind: str, line: Line, ends_world: NDArray) -> DataEdge:
     normals, inward = line.normals[: line.flanks], line.inward[: line.flanks]
-    return DataEdge(KIND_NAMES[kind], line.ends, ends_world, normals, inward, line.pixels, line.rms, line.offset_sigma, line.angle_sigma)
+    return DataEdge(kind, line.ends, ends_world, normals, inward, line.pixels, line.rms, line.offset_sigma, line.angle_sigma)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _directions(
     number: NDArray, u: NDArray, v: NDArray, kind: NDArray, depth: NDArray, gate: float, radius: int
 ) -> tuple[NDArray, NDArray]:
