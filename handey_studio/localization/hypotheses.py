@@ -8,19 +8,9 @@ from numpy.typing import NDArray
 
 from handey_studio.localization.edges import CONVEX
 from handey_studio.localization.pairs import DataLines, ModelEdges, Pairs, ParallelPairs
-from handey_studio.sensing.depth_view import DepthView
+from handey_studio.localization.tolerances import MatchTolerances, allowed, allowed_apart, sure
 
 MIN_LENGTH_SHARE = 0.5  # of its model edge that a single data edge must show
-
-
-class MatchTolerances(NamedTuple):
-    """How far data may lie from the model: `angle` [rad] of α, `offset` [m] of d, `reach` [m] that a data edge may stick out of its
-    model edge, `flank` the cosine between a surface beside the data edge and the model's face there."""
-
-    angle: float
-    offset: float
-    reach: float
-    flank: float
 
 
 class Assignments(NamedTuple):
@@ -47,15 +37,13 @@ FELL = (
 )
 
 
-def tolerances(view: DepthView) -> MatchTolerances:
-    """From the view's noise and how far its silhouettes may lie off."""
-    reach = 2.0 * view.outline_error + 3.0 * view.noise
-    return MatchTolerances(np.deg2rad(10.0), 1.2 * view.outline_error + 3.0 * view.noise, reach, float(np.cos(np.deg2rad(25.0))))
-
-
 def hypothesize(edges: ModelEdges, table: Pairs, lines: DataLines, pairs: Pairs, limits: MatchTolerances, most: int) -> Assignments:
-    """At most four transforms for each consistent assignment of a data pair to a model pair; the first `most` of them."""
-    R, t, numbers, tried, fell = _match(edges, table, lines, pairs, limits, most)
+    """At most four transforms for each consistent assignment of a data pair to a model pair; the first `most` of them.
+
+    How far they may lie apart is told by how well the data edges are known; those whose angles are too unsure for the part propose nothing.
+    """
+    pairs = pairs.rows(sure(edges, lines, pairs.first, pairs.second, limits))
+    R, t, numbers, tried, fell = _match(edges, table, lines, pairs, limits, allowed(lines, pairs, limits), most)
     return Assignments(R, t, numbers[:, :2], numbers[:, 2:], int(tried), fell)
 
 
@@ -64,14 +52,15 @@ def hypothesize_parallel(
 ) -> Assignments:
     """The same for parallel edges, which fix a transform but for its slide along them: an end of a data edge is laid on the
     end of its model edge."""
-    R, t, numbers, tried, fell = _match_parallel(edges, table, lines, pairs, limits, most)
+    R, t, numbers, tried, fell = _match_parallel(edges, table, lines, pairs, limits, allowed_apart(lines, pairs, limits), most)
     return Assignments(R, t, numbers[:, :2], numbers[:, 2:], int(tried), fell)
 
 
 def hypothesize_single(edges: ModelEdges, lines: DataLines, limits: MatchTolerances, most: int) -> Assignments:
     """The same for single edges that are seen for a good part of their length: the surface beside such an edge is the second line that the
     paper asks for, and an end of it is laid on the end of its model edge. Half-hidden parts often show no two edges."""
-    R, t, numbers, tried, fell = _match_single(edges, lines, limits, most)
+    every = np.arange(len(lines.half))
+    R, t, numbers, tried, fell = _match_single(edges, lines, limits, sure(edges, lines, every, every, limits), most)
     return Assignments(R, t, numbers[:, :2], numbers[:, 2:], int(tried), fell)
 
 
@@ -117,7 +106,7 @@ def _flanks_agree(R, edges, m, lines, i, sign, limit):
 
 
 @njit(cache=True)
-def _match(edges, table, lines, pairs, limits, most):
+def _match(edges, table, lines, pairs, limits, allowed, most):
     R_out, t_out = np.empty((most, 3, 3)), np.empty((most, 3))
     numbers = np.empty((most, 4), dtype=np.int64)
     fell = np.zeros(4, dtype=np.int64)
@@ -134,15 +123,15 @@ def _match(edges, table, lines, pairs, limits, most):
             for code in range(4):
                 s, w = (1.0 if code & 1 else -1.0), (1.0 if code & 2 else -1.0)
                 alpha = pairs.alpha[p] if s * w > 0 else np.pi - pairs.alpha[p]
-                if abs(alpha - table.alpha[q]) > limits.angle:
+                if abs(alpha - table.alpha[q]) > allowed.alpha[p]:
                     fell[0] += 1
                     continue
-                if abs(s * w * pairs.d[p] - table.d[q]) > limits.offset:
+                if abs(s * w * pairs.d[p] - table.d[q]) > allowed.d[p]:
                     fell[1] += 1
                     continue
                 off1 = abs(s * pairs.foot1[p] - table.foot1[q]) + lines.half[i] - edges.half[a]
                 off2 = abs(w * pairs.foot2[p] - table.foot2[q]) + lines.half[j] - edges.half[b]
-                if off1 > limits.reach or off2 > limits.reach:
+                if off1 > allowed.past1[p] or off2 > allowed.past2[p]:
                     fell[2] += 1
                     continue
                 _frame(edges.direction[a], edges.direction[b], frame_model)
@@ -183,7 +172,7 @@ def _axes(along, across, out):
 
 
 @njit(cache=True)
-def _match_parallel(edges, table, lines, pairs, limits, most):
+def _match_parallel(edges, table, lines, pairs, limits, allowed, most):
     R_out, t_out = np.empty((most, 3, 3)), np.empty((most, 3))
     numbers, fell = np.empty((most, 4), dtype=np.int64), np.zeros(4, dtype=np.int64)
     frame_model, frame_data = np.empty((3, 3)), np.empty((3, 3))
@@ -195,7 +184,7 @@ def _match_parallel(edges, table, lines, pairs, limits, most):
         for q in range(len(table.first)):
             a, b = table.first[q], table.second[q]
             tried += 1
-            if abs(pairs.d[p] - table.d[q]) > limits.offset:
+            if abs(pairs.d[p] - table.d[q]) > allowed[p]:
                 fell[1] += 1
                 continue
             if lines.half[i] > edges.half[a] + limits.reach / 2 or lines.half[j] > edges.half[b] + limits.reach / 2:
@@ -248,13 +237,13 @@ def _match_parallel(edges, table, lines, pairs, limits, most):
 
 
 @njit(cache=True)
-def _match_single(edges, lines, limits, most):
+def _match_single(edges, lines, limits, sure, most):
     R_out, t_out = np.empty((most, 3, 3)), np.empty((most, 3))
     numbers, fell = np.empty((most, 4), dtype=np.int64), np.zeros(4, dtype=np.int64)
     frame_model, frame_data = np.empty((3, 3)), np.empty((3, 3))
     n = tried = 0
     for i in range(len(lines.half)):
-        if lines.side[i, 0] == 0.0:
+        if lines.side[i, 0] == 0.0 or not sure[i]:
             continue
         for a in range(len(edges.half)):
             tried += 1

@@ -4,6 +4,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.geometry.lines import RelativePose, relative_pose
@@ -39,6 +40,8 @@ class DataLines(NamedTuple):
     kind: NDArray
     flank: NDArray
     side: NDArray
+    offset_sigma: NDArray
+    angle_sigma: NDArray
 
 
 class Pairs(NamedTuple):
@@ -52,6 +55,10 @@ class Pairs(NamedTuple):
     foot1: NDArray
     foot2: NDArray
 
+    def rows(self, chosen: NDArray) -> "Pairs":
+        """Some of the pairs."""
+        return Pairs(*(array[chosen] for array in self))
+
 
 class ParallelPairs(NamedTuple):
     """Pairs of parallel edges `first`, `second` (n,): `across` (n, 3) the unit direction from the first line to the second, `d` (n,) [m]
@@ -62,6 +69,10 @@ class ParallelPairs(NamedTuple):
     across: NDArray
     d: NDArray
     ahead: NDArray
+
+    def rows(self, chosen: NDArray) -> "ParallelPairs":
+        """Some of the pairs."""
+        return ParallelPairs(*(array[chosen] for array in self))
 
 
 @lru_cache(maxsize=64)
@@ -83,7 +94,7 @@ def model_pairs(part: Part) -> Pairs:
     first, second = (index.reshape(-1) for index in np.indices((len(edges.half),) * 2))
     pairs = _pairs(edges.middle, edges.direction, first, second)
     keep = _foremost(part, edges, pairs.first, pairs.second)
-    return Pairs(*(array[keep] for array in pairs))
+    return pairs.rows(keep)
 
 
 @lru_cache(maxsize=64)
@@ -93,7 +104,7 @@ def model_parallels(part: Part) -> ParallelPairs:
     first, second = (index.reshape(-1) for index in np.indices((len(edges.half),) * 2))
     pairs = _parallels(edges.middle, edges.direction, first, second, SAME_RAD)
     keep = _foremost(part, edges, pairs.first, pairs.second) & (pairs.d > SAME_M)
-    return ParallelPairs(*(array[keep] for array in pairs))
+    return pairs.rows(keep)
 
 
 def _foremost(part: Part, edges: ModelEdges, first: NDArray, second: NDArray) -> NDArray:
@@ -108,26 +119,30 @@ def data_lines(edges: tuple[DataEdge, ...]) -> DataLines:
     n = len(edges)
     kind = np.array([KIND_NAMES.index(edge.kind) for edge in edges], dtype=np.int64)
     ends = np.array([edge.ends_sensor for edge in edges]).reshape(n, 2, 3)
-    direction = np.array([edge.direction for edge in edges]).reshape(n, 3)
-    flank, side = np.zeros((n, 2, 3)), np.zeros((n, 2))
-    for i, edge in enumerate(edges):
-        for k, (normal, inward) in enumerate(zip(edge.normals_sensor, edge.inward_sensor, strict=True)):
-            flank[i, k] = normal
-            side[i, k] = 1.0 if inward @ np.cross(normal, direction[i]) > 0 else -1.0
-    half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2
-    return DataLines(ends.mean(axis=1), direction, half, kind, flank, side)
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    direction = along / length[:, None]
+    flanks = np.array([len(edge.normals_sensor) for edge in edges], dtype=int)
+    seen = np.arange(2) < flanks[:, None]  # (n, 2)
+    flank, inward, side = np.zeros((n, 2, 3)), np.zeros((n, 2, 3)), np.zeros((n, 2))
+    flank[seen] = np.concatenate([np.zeros((0, 3)), *(edge.normals_sensor for edge in edges)])
+    inward[seen] = np.concatenate([np.zeros((0, 3)), *(edge.inward_sensor for edge in edges)])
+    left = np.einsum("nki,nki->nk", inward, np.cross(flank, direction[:, None]))
+    side[seen] = np.where(left[seen] > 0, 1.0, -1.0)
+    offset, angle = (np.array([getattr(edge, key) for edge in edges]) for key in ("offset_sigma", "angle_sigma"))
+    return DataLines(ends.mean(axis=1), direction, length / 2, kind, flank, side, offset, angle)
 
 
 def data_pairs(lines: DataLines, reach: float) -> Pairs:
     """Pairs of data edges that are not parallel and whose ends lie within `reach` [m] of one another, long ones first."""
-    first, second = _together(lines, reach)
+    first, second = _together(lines.middle, lines.direction, lines.half, reach)
     order = np.argsort(-np.minimum(lines.half[first], lines.half[second]), kind="stable")
     return _pairs(lines.middle, lines.direction, first[order], second[order])
 
 
 def data_parallels(lines: DataLines, reach: float, angle: float) -> ParallelPairs:
     """Pairs of data edges that are parallel to within `angle` [rad] and whose ends lie within `reach` [m], long ones first."""
-    first, second = _together(lines, reach)
+    first, second = _together(lines.middle, lines.direction, lines.half, reach)
     order = np.argsort(-np.minimum(lines.half[first], lines.half[second]), kind="stable")
     return _parallels(lines.middle, lines.direction, first[order], second[order], angle)
 
@@ -145,15 +160,26 @@ def _parallels(middle: NDArray, direction: NDArray, first: NDArray, second: NDAr
     return ParallelPairs(first, second, across / np.maximum(d, 1e-12)[:, None], d, ahead)
 
 
-def _together(lines: DataLines, reach: float) -> tuple[NDArray, NDArray]:
+@njit(cache=True)
+def _together(middle: NDArray, direction: NDArray, half: NDArray, reach: float) -> tuple[NDArray, NDArray]:
     """Numbers of two edges each, of which every end is within `reach` [m] of the other's ends: one part could hold both."""
-    first, second = np.triu_indices(len(lines.half), 1)
-    apart = np.zeros(len(first))
-    ends = [lines.middle + sign * lines.half[:, None] * lines.direction for sign in (-1.0, 1.0)]
-    for one in ends:
-        for other in ends:
-            apart = np.maximum(apart, np.linalg.norm(one[first] - other[second], axis=1))
-    return first[apart <= reach], second[apart <= reach]
+    n = len(half)
+    first, second = np.empty(n * (n - 1) // 2, dtype=np.int64), np.empty(n * (n - 1) // 2, dtype=np.int64)
+    count = 0
+    for i in range(n):
+        for j in range(i + 1, n):
+            near = True
+            for s in (-1.0, 1.0):
+                for w in (-1.0, 1.0):
+                    squared = 0.0
+                    for r in range(3):
+                        apart = middle[i, r] + s * half[i] * direction[i, r] - middle[j, r] - w * half[j] * direction[j, r]
+                        squared += apart * apart
+                    near = near and squared <= reach * reach
+            if near:
+                first[count], second[count] = i, j
+                count += 1
+    return first[:count], second[:count]
 
 
 def _pairs(middle: NDArray, direction: NDArray, first: NDArray, second: NDArray) -> Pairs:

@@ -11,7 +11,7 @@ MIN_PIXELS = 10
 TRIM = 2.5  # sigmas; rounds of trimming take the corners' rounding off a run
 MIN_PLACES = 6  # along a silhouette
 STEP_SIGMA = 0.29  # px; of a place known to lie somewhere within one pixel
-RAGGED_PX = 1.5  # a sensor that loses more than this at silhouettes loses it all along them
+RAGGED_PX = 1.5  # what a sensor loses beyond this at silhouettes it loses all along them
 
 
 @njit(cache=True)
@@ -61,7 +61,7 @@ def outline(seen: Seen, outward: NDArray, u: NDArray, v: NDArray) -> tuple[NDArr
         tells[i] = out > 0
         k = _beyond(seen.depth, int(v[i]), int(u[i]), sign * axis, sign * (1 - axis), 3 + int(2.0 * lost))
         on = min(0.5 * k, 0.5 + 0.2 * lost)
-        systematic += min(STEP_SIGMA * (k - 1), 0.4 * lost) + (0.5 * lost if lost > RAGGED_PX else 0.0)
+        systematic += min(STEP_SIGMA * (k - 1), 0.4 * lost) + min(0.5 * lost, max(lost - RAGGED_PX, 0.0))
         x[i] += sign * (1 - axis) * on
         y[i] += sign * axis * on
     _nearest_only(seen.depth, u, v, v if axis == 0 else u, tells)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from handey_studio.base import Ledger
 from handey_studio.localization.edges import edge_pixels
 from handey_studio.localization.evidence import Evidence, Limits, evidence_of, limits_of
-from handey_studio.localization.hypotheses import MatchTolerances, tolerances
 from handey_studio.localization.refine import Weights, weights_of
 from handey_studio.localization.result import LocateOptions
 from handey_studio.localization.segments import DataEdge, data_edges, link
 from handey_studio.localization.surface import surface_of
+from handey_studio.localization.tolerances import MatchTolerances, tolerances
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world.part import Part
 

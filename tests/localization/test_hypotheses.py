@@ -1,6 +1,6 @@
 """Pairs of edges: the true pose is among the hypotheses, checked against a brute-force matcher."""
 
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 
 import numpy as np
 import pytest
@@ -11,16 +11,17 @@ from scipy.spatial.transform import Rotation
 from handey_studio.geometry import box, prism
 from handey_studio.geometry.transforms import apply, rotate, transform
 from handey_studio.localization.distinct import displacement
-from handey_studio.localization.hypotheses import MatchTolerances, hypothesize
-from handey_studio.localization.pairs import MIN_ALPHA, data_lines, data_pairs, model_edges, model_pairs
+from handey_studio.localization.hypotheses import hypothesize
+from handey_studio.localization.pairs import MIN_ALPHA, data_lines, data_pairs, data_parallels, model_edges, model_pairs
 from handey_studio.localization.result import pose_matrix
 from handey_studio.localization.segments import DataEdge
+from handey_studio.localization.tolerances import MatchTolerances
 from handey_studio.world.part import Part
 
 L = Part("l", prism([[0, 0], [0.06, 0], [0.06, 0.0295], [0.0295, 0.0295], [0.0295, 0.06], [0, 0.06]], 0.04))
 BRICK = Part("brick", box([0.08, 0.05, 0.03]))
 SKEW = next((i, j) for i, j in permutations(range(12), 2) if abs(model_edges(BRICK).direction[i] @ model_edges(BRICK).direction[j]) < 0.5)
-TIGHT = MatchTolerances(np.deg2rad(2.0), 0.001, 0.001, np.cos(np.deg2rad(10.0)))
+TIGHT = MatchTolerances(np.deg2rad(2.0), 0.001, 0.001, np.cos(np.deg2rad(10.0)), 0.0005)
 
 
 def edge_of(part, number, T, span=(0.0, 1.0), turned=False):
@@ -95,6 +96,24 @@ def brute_force(part, seen):
         if max(over) < 1e-6:
             poses.append(pose_matrix(R, t))
     return poses
+
+
+def test_pairs_are_those_that_one_part_could_hold():
+    """Every end within reach of the other's ends, by brute force; both surfaces of an edge on the side where they are."""
+    rng = np.random.default_rng(2)
+    seen = tuple(
+        edge_of(L, int(k), transform(Rotation.random(rng=rng).as_matrix(), rng.uniform(-0.1, 0.1, 3))) for k in rng.integers(0, 18, 30)
+    )
+    lines = data_lines(seen)
+    pairs, parallels = data_pairs(lines, 0.12), data_parallels(lines, 0.12, MIN_ALPHA)
+    found = {tuple(sorted(map(int, two))) for kind in (pairs, parallels) for two in zip(kind.first, kind.second, strict=True)}
+    apart = {
+        (i, j): max(np.linalg.norm(a - b) for a in seen[i].ends_sensor for b in seen[j].ends_sensor) for i, j in combinations(range(30), 2)
+    }
+    assert found == {two for two, distance in apart.items() if distance <= 0.12} and 5 < len(found) < len(apart)
+    for i, edge in enumerate(seen):
+        for k, (normal, inward) in enumerate(zip(edge.normals_sensor, edge.inward_sensor, strict=True)):
+            assert lines.side[i, k] == np.sign(inward @ np.cross(normal, edge.direction)) and np.array_equal(lines.flank[i, k], normal)
 
 
 def test_data_longer_than_any_model_edge_give_nothing():
