@@ -11,7 +11,7 @@ from handey_studio.sensing.depth_view import DepthView
 SIGMAS = 2.0  # by which data may lie off
 UNSURE_ANGLE = np.deg2rad(0.5)  # adds to the sigma of an angle: no edge is quite as straight as its line
 ENDS = 0.6  # of the reach, for the ends of edges; the rest is for their lines
-CORNERS = 0.8  # of the reach: by more than this an edge's angle must not throw the part's far corner off
+CORNERS = 1.5  # of the reach: by more than this angles must not throw a part's far corner off; half-hidden parts need rough ones too
 
 
 class MatchTolerances(NamedTuple):

@@ -92,7 +92,7 @@ def test_long_clean_edges_are_strict_and_short_ones_lax_within_the_limits():
 
 def test_an_angle_must_be_sure_for_the_size_of_the_part():
     edges, T = model_edges(BRICK), transform(translation=(0, 0, 1))
-    lines = data_lines(tuple(replace(edge_of(BRICK, k, T), angle_sigma=angle) for k, angle in zip(SKEW, (0.001, 0.06), strict=True)))
+    lines = data_lines(tuple(replace(edge_of(BRICK, k, T), angle_sigma=angle) for k, angle in zip(SKEW, (0.001, 0.11), strict=True)))
     small = edges._replace(middle=edges.middle / 2, half=edges.half / 2)
     one, other = np.array([0, 0, 1]), np.array([0, 1, 1])
     assert sure(edges, lines, one, other, LIMITS).tolist() == [True, False, False]
