@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from handey_studio.base import Value, frozen_array
 from handey_studio.motion.certificate import Mover
 from handey_studio.motion.distance_field import distance_field
-from handey_studio.motion.forbidden import first_ranges, second_ranges, third_ranges
+from handey_studio.motion.forbidden_ranges import first_ranges, second_ranges, third_ranges
 from handey_studio.motion.self_collision import self_blocked
 from handey_studio.motion.turning import Between, angle_table, carried_circles, hinges_of, link_circles, reach_of
 from handey_studio.motion.wrist_box import WristBox
