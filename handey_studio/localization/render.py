@@ -12,8 +12,8 @@ def rendered_depth(corners_sensor: NDArray, triangles: NDArray, shape: tuple[int
 
     Corners must lie in front of the sensor; triangles that do not are left out.
     """
-    out, drawn = np.full(shape, np.nan), np.full(shape, -1)
-    draw(np.ascontiguousarray(corners_sensor), np.ascontiguousarray(triangles), camera, 0, 0, out, drawn)
+    out, drawn = np.full(shape, np.nan), np.full(shape, -1, dtype=np.int32)
+    draw(np.ascontiguousarray(corners_sensor), np.ascontiguousarray(triangles), np.arange(len(triangles)), camera, 0, 0, out, drawn)
     return out
 
 
@@ -22,8 +22,8 @@ def claimed_pixels(corners_sensor: NDArray, triangles: NDArray, evidence: Eviden
     width = evidence.depth.shape[1]
     corners = np.ascontiguousarray(corners_sensor)
     u0, v0, u1, v1 = window(corners, evidence.camera, evidence.depth.shape)
-    depth, drawn = np.full((v1 - v0, u1 - u0), np.nan), np.full((v1 - v0, u1 - u0), -1)
-    draw(corners, np.ascontiguousarray(triangles), evidence.camera, u0, v0, depth, drawn)
+    depth, drawn = np.full((v1 - v0, u1 - u0), np.nan), np.full((v1 - v0, u1 - u0), -1, dtype=np.int32)
+    draw(corners, np.ascontiguousarray(triangles), np.arange(len(triangles)), evidence.camera, u0, v0, depth, drawn)
     with np.errstate(invalid="ignore"):
         v, u = np.nonzero(np.abs(evidence.depth[v0:v1, u0:u1] - depth) < agree)
     return (v + v0) * width + u + u0
@@ -44,9 +44,9 @@ def window(corners, camera, shape):
     return u0, v0, u1, v1
 
 
-@njit(cache=True)
-def draw(corners, triangles, camera, u0, v0, out, drawn):
-    """Draws triangles into `out` (H, W) [m], whose first pixel is (u0, v0) of the view, and their numbers into `drawn` (H, W); the
+@njit(cache=True, error_model="numpy")
+def draw(corners, triangles, numbers, camera, u0, v0, out, drawn):
+    """Draws triangles into `out` (H, W) [m], whose first pixel is (u0, v0) of the view, and their `numbers` into `drawn` (H, W); the
     nearest surface stays."""
     height, width = out.shape
     parallel = camera[0] > 0.5
@@ -62,13 +62,15 @@ def draw(corners, triangles, camera, u0, v0, out, drawn):
         area = (u[1] - u[0]) * (v[2] - v[0]) - (u[2] - u[0]) * (v[1] - v[0])
         if not ahead or abs(area) < 1e-12:
             continue
+        ua, ub, uc, va, vb, vc, each = u[0], u[1], u[2], v[0], v[1], v[2], 1.0 / area
+        first, last = max(0, int(np.ceil(u.min()))), min(width - 1, int(np.floor(u.max())))
         for j in range(max(0, int(np.ceil(v.min()))), min(height - 1, int(np.floor(v.max()))) + 1):
-            for i in range(max(0, int(np.ceil(u.min()))), min(width - 1, int(np.floor(u.max()))) + 1):
-                a = ((u[1] - i) * (v[2] - j) - (u[2] - i) * (v[1] - j)) / area
-                b = ((u[2] - i) * (v[0] - j) - (u[0] - i) * (v[2] - j)) / area
+            for i in range(first, last + 1):
+                a = ((ub - i) * (vc - j) - (uc - i) * (vb - j)) * each
+                b = ((uc - i) * (va - j) - (ua - i) * (vc - j)) * each
                 if a < 0.0 or b < 0.0 or a + b > 1.0:
                     continue
                 value = a * w[0] + b * w[1] + (1.0 - a - b) * w[2]
                 z = value if parallel else 1.0 / value
                 if not out[j, i] <= z:
-                    out[j, i], drawn[j, i] = z, n
+                    out[j, i], drawn[j, i] = z, numbers[n]

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from handey_studio.localization.evidence import Evidence, ray_at
 from handey_studio.localization.render import draw, window
-from handey_studio.localization.verify import GRAZING, STEEP, _dot
+from handey_studio.localization.shares import shared
+from handey_studio.localization.verify import GRAZING, LEAST_POSES, STEEP, turned
 from handey_studio.world.part import Part
 
 NOISES = 3.5  # of a reading, within which it lies on a face
@@ -37,7 +38,9 @@ class Tally(NamedTuple):
 
 def second_look(part: Part, R: NDArray, t: NDArray, evidence: Evidence, noise: float) -> Tally:
     """Tallies of the poses R (n, 3, 3), t (n, 3) of a part in the sensor's frame, before a sensor of `noise` [m]."""
-    counts = _tally(np.ascontiguousarray(R), np.ascontiguousarray(t), *_surface(part), evidence, noise)
+    R, t, counts = np.ascontiguousarray(R), np.ascontiguousarray(t), np.zeros((len(t), 5))
+    surface = _surface(part)
+    shared(lambda first, last: _tally(R, t, *surface, evidence, noise, (first, last), counts), len(t), LEAST_POSES)
     return Tally(*(counts.T * evidence.pixel**2))
 
 
@@ -49,37 +52,31 @@ def _surface(part: Part) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     return np.array(solid.vertices), np.array(solid.triangles), owner, np.array(solid.normals)
 
 
-@njit(cache=True)
-def _tally(R, t, vertices, triangles, owner, normals, evidence, noise):
-    out = np.zeros((len(t), 5))
-    corners = np.empty_like(vertices)
-    for n in range(len(t)):
-        for k in range(len(vertices)):
-            for r in range(3):
-                corners[k, r] = _dot(R[n], r, vertices[k]) + t[n, r]
+@njit(cache=True, nogil=True)
+def _tally(R, t, vertices, triangles, owner, normals, evidence, noise, poses, out):
+    for n in range(poses[0], poses[1]):
+        corners = turned(R[n], vertices) + t[n]
         u0, v0, u1, v1 = window(corners, evidence.camera, evidence.depth.shape)
-        depth, drawn = np.full((v1 - v0, u1 - u0), np.nan), np.full((v1 - v0, u1 - u0), -1)
-        draw(corners, triangles, evidence.camera, u0, v0, depth, drawn)
-        _count(R[n], depth, drawn, u0, v0, owner, normals, evidence, noise, out[n])
-    return out
+        depth, face = np.full((v1 - v0, u1 - u0), np.nan), np.full((v1 - v0, u1 - u0), -1, dtype=np.int32)
+        draw(corners, triangles, owner, evidence.camera, u0, v0, depth, face)
+        _count(depth, face, u0, v0, turned(R[n], normals), evidence.depth[v0:v1, u0:u1], evidence.camera, noise, out[n])
 
 
-@njit(cache=True)
-def _count(R, depth, drawn, u0, v0, owner, normals, evidence, noise, out):
+@njit(cache=True, error_model="numpy")
+def _count(depth, face, u0, v0, normals, readings, camera, noise, out):
     """Adds the pixels whose neighbours all show the same face: at the others the sensor sees two surfaces in one."""
-    camera = evidence.camera
     for j in range(1, depth.shape[0] - 1):
         for i in range(1, depth.shape[1] - 1):
-            if drawn[j, i] < 0 or not _inside(drawn, owner, j, i):
+            f = face[j, i]
+            if f < 0 or not _inside(face, j, i):
                 continue
             z, scale = depth[j, i], 1.0 if camera[0] > 0.5 else depth[j, i]
             x, y = (i + u0 - camera[3]) / camera[1] * scale, (j + v0 - camera[4]) / camera[2] * scale
             rx, ry, rz = ray_at(x, y, z, camera)
-            normal = normals[owner[drawn[j, i]]]
-            cosine = -(_dot(R, 0, normal) * rx + _dot(R, 1, normal) * ry + _dot(R, 2, normal) * rz)
+            cosine = -(normals[f, 0] * rx + normals[f, 1] * ry + normals[f, 2] * rz)
             if cosine < GRAZING:
                 continue
-            behind = (evidence.depth[j + v0, i + u0] - z) / rz * cosine  # the reading, along the face's normal
+            behind = (readings[j, i] - z) / rz * cosine  # the reading, along the face's normal
             if np.isnan(behind):
                 out[4] += cosine > STEEP
             elif behind < -NOISES * noise:
@@ -89,11 +86,10 @@ def _count(R, depth, drawn, u0, v0, owner, normals, evidence, noise, out):
 
 
 @njit(cache=True)
-def _inside(drawn, owner, j, i):
+def _inside(face, j, i):
     """Whether a pixel's neighbours show the same face."""
-    face = owner[drawn[j, i]]
     for a in range(j - 1, j + 2):
         for b in range(i - 1, i + 2):
-            if drawn[a, b] < 0 or owner[drawn[a, b]] != face:
+            if face[a, b] != face[j, i]:
                 return False
     return True

@@ -109,11 +109,6 @@ def reading_at(x, y, z, depth, camera, limits):
     return (THROUGH if behind > limits.through else ON), behind
 
 
-@njit(cache=True)
-def _dot(R, r, w):
-    return R[r, 0] * w[0] + R[r, 1] * w[1] + R[r, 2] * w[2]
-
-
 @njit(cache=True, error_model="numpy", inline="always")
 def placed(R, t, points, k):
     """Point number k of a part at a pose."""
