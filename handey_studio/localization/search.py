@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Ledger
 from handey_studio.localization.edges import edge_pixels
-from handey_studio.localization.evidence import Evidence, Limits, evidence_of, limits_of
+from handey_studio.localization.evidence import ROUGH, Evidence, Limits, evidence_of, limits_of
 from handey_studio.localization.refine import Weights, weights_of
 from handey_studio.localization.result import LocateOptions
 from handey_studio.localization.segments import DataEdge, data_edges, link
@@ -18,10 +18,10 @@ from handey_studio.localization.tolerances import MatchTolerances, tolerances
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world.part import Part
 
-ROUGH = 1.8  # tolerances of poses straight from two edges, against those of refined ones
 MIN_EDGE_PX = 8.0
 STAGES = ("edges", "evidence", "hypothesize", "verify", "refine", "accept")
 TABLE_SHARE = 0.02  # of the readings that must lie at the table's height before the table is believed in
+TABLE_READINGS = 30_000  # about as many are asked
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,9 @@ def _sees_table(view: DepthView, options: LocateOptions) -> bool:
     """Whether enough readings lie at the table's height for it to be there."""
     if options.table_z_m is None:
         return False
-    points = view.points_sensor()
+    every = max(1, int(np.sqrt(view.depth.size / TABLE_READINGS)))
+    v, u = np.mgrid[: view.depth.shape[0] : every, : view.depth.shape[1] : every]
+    points = view.projection.unproject(np.stack([u, v], axis=-1).astype(float), view.depth[v, u])
     z = points @ view.T_world_sensor[2, :3] + view.T_world_sensor[2, 3] - options.table_z_m
     z = z[np.isfinite(z)]
     return bool(len(z)) and bool(np.mean(np.abs(z) < 5.0 * view.noise) > TABLE_SHARE)

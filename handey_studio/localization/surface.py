@@ -19,6 +19,7 @@ MAX_NORMAL_ERROR = 0.05  # rad; the window grows until the noise of a normal is 
 MAX_SLOPE = 2.7  # tan 70°: steeper surfaces return too few readings to be told from a jump
 MIN_SAMPLES = 5
 MAX_RADIUS_PX = 6
+TYPICAL_READINGS = 30_000
 LEAST_ROWS = 32  # that are worth a share
 ONE_PLANE = 1.6  # sigmas rms about a plane, up to which it is taken to explain the whole window
 
@@ -47,8 +48,7 @@ class Surface(Value):
 
 def surface_of(view: DepthView) -> Surface:
     """Normals by least squares in a window that leaves out what lies across a jump."""
-    readings = view.depth[np.isfinite(view.depth)]
-    typical = float(np.median(readings)) if len(readings) else 1.0
+    typical = _typical(view.depth)
     pixel = float(1.0 / view.projection.pixels_per_metre(typical))
     radius = window_radius(view.noise, pixel)
     camera, noise = camera_of(view.projection), (view.noise, typical)
@@ -58,6 +58,16 @@ def surface_of(view: DepthView) -> Surface:
     for array in (slope, normals):
         array.flags.writeable = False  # shared from here on, not copied
     return Surface(normals, slope, radius, pixel, typical)
+
+
+def _typical(depth: NDArray) -> float:
+    """The median [m] of a map's readings, or of enough of them; 1 if there are none."""
+    for every in (max(1, int(np.sqrt(depth.size / TYPICAL_READINGS))), 1):
+        readings = depth[::every, ::every]
+        readings = readings[np.isfinite(readings)]
+        if len(readings):
+            return float(np.median(readings))
+    return 1.0
 
 
 def window_radius(noise: float, pixel: float) -> int:
