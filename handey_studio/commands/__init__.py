@@ -11,12 +11,28 @@ from handey_studio.commands import (
     move,
     path,
     plan,
+    robot_check,
+    robot_list,
     scan,
     scan_calibrate,
     scan_simulate,
     studio,
 )
 
-COMMANDS = (studio, locate, scan, scan_calibrate, scan_simulate, move, plan, path, bench_piles, bench_locate, fit_score)
+COMMANDS = (
+    studio,
+    locate,
+    scan,
+    scan_calibrate,
+    scan_simulate,
+    move,
+    plan,
+    path,
+    bench_piles,
+    bench_locate,
+    fit_score,
+    robot_check,
+    robot_list,
+)
 
 __all__ = ["COMMANDS"]

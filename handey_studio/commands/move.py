@@ -21,6 +21,7 @@ def add_arguments(move: argparse.ArgumentParser) -> None:
     move.add_argument("session", help="a session file, or its name in a library")
     move.add_argument("--part", help="move this part instead of running the session's own commands")
     move.add_argument("--to", metavar="DESTINATION", help="x,y,z[,roll,pitch,yaw] (metres, degrees) or on:PART[:POSE]")
+    move.add_argument("--robot", help="a robot of the library, or a folder with a robot.toml, instead of the session's own")
     move.add_argument("--seed", type=int, help="instead of the session's own seed")
     move.add_argument("--json", type=Path, help="where the steps, the certificate and the ledger go")
     move.add_argument("--save", type=Path, metavar="SESSION2", help="where the session with its results goes")
@@ -40,6 +41,8 @@ def run_moves(given: argparse.Namespace, execute: bool) -> int:
         check_output(output)
     library = Library.choose(given.library)
     session = read_session(find_session(library, given.session))
+    if given.robot is not None:
+        session = replace(session, workcell=replace(session.workcell, robot=given.robot))
     commands = _commands(given, session)
     seed = session.seed if given.seed is None else given.seed
     station, cell = station_of(session, library), cell_of(session, library)

@@ -29,7 +29,7 @@ def straight_path(
 ) -> PathResult:
     """The hand through poses (k, 4, 4), a few millimetres apart, from `q_start` (joints,) [rad], with the fingers `opening` [m] apart.
 
-    Follows the branch of the inverse kinematics that `q_start` is on. The margin kept is `margin` [m], or half of the least
+    Follows the branch of the inverse kinematics that `q_start` is on; held joints stay as they are there. The margin kept is `margin` [m], or half of the least
     clearance at the poses where that is less; the certificate tells. Fails, with the place and the reason, where a pose is out of
     reach, a joint would jump or leave its limits, or bodies meet that are not in `allowed`.
     """
@@ -74,7 +74,7 @@ def _follow(arm: Arm, q_start: NDArray, hands: NDArray, first: int) -> tuple[NDA
     points = [q_start]
     for k in range(first, len(hands)):
         here = points[-1]
-        branches = arm.nearest_turns(arm.ik(hands[k]), here)
+        branches = arm.nearest_turns(arm.ik(hands[k], here[arm.robot.held_index]), here)
         place = f"pose {k + 1} of {len(hands)}"
         if not len(branches):
             return np.array(points), f"{place} is out of reach"

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Value, frozen_array
-from handey_studio.motion import Certificate, PathResult, certify, plan_path, straight_path, time_path
+from handey_studio.motion import Certificate, PathOptions, PathResult, certify, plan_path, straight_path, time_path
 from handey_studio.task.grasp_search import CLOSED_MARGIN_M, Grasp, finger_pairs, reachable
 from handey_studio.task.options import Pairs
 from handey_studio.task.plan import MovePlan, Step, StepKind
@@ -44,7 +44,7 @@ class _End(Value):
 
 def complete(grasp: Grasp, start: Start, ledger: Ledger, progress: Progress, rng: np.random.Generator) -> MovePlan | None:
     """A plan with this grasp, or None, and the reasons in the ledger below the grasp's entry."""
-    goal, choice = grasp.option.goal, grasp.choice
+    goal, choice, robot = grasp.option.goal, grasp.choice, grasp.option.goal.at_start.robot
     pickups = reachable(goal.at_start, grasp.T_world_hand_pickup, choice.opening, start.q, "pickup", grasp.entry, ledger)
     putdowns = reachable(goal.at_goal, grasp.T_world_hand_putdown, choice.opening, start.q, "putdown", grasp.entry, ledger)
     if not pickups or not putdowns:
@@ -53,7 +53,7 @@ def complete(grasp: Grasp, start: Start, ledger: Ledger, progress: Progress, rng
     ends: dict[int, _End | None] = {}
     others: dict[int, _End | None] = {}
     joined = False
-    for a, b in _pairs(pickups, putdowns, start.q)[:MAX_PAIRS]:
+    for a, b in _pairs(pickups, putdowns, start.q, robot.held_index)[:MAX_PAIRS]:
         if a not in ends:
             ends[a] = _pickup_end(grasp, pickups[a], ledger)
         if b not in others and ends[a] is not None:
@@ -69,14 +69,14 @@ def complete(grasp: Grasp, start: Start, ledger: Ledger, progress: Progress, rng
     return None
 
 
-def _pairs(pickups: list[NDArray], putdowns: list[NDArray], q: NDArray) -> list[tuple[int, int]]:
-    """Which branch at the pickup with which at the putdown, least joint motion from the start over both first."""
-    cost = {
-        (a, b): float(np.abs(pickups[a] - q).max() + np.abs(putdowns[b] - pickups[a]).max())
-        for a in range(len(pickups))
-        for b in range(len(putdowns))
-    }
-    return sorted(cost, key=cost.__getitem__)
+def _pairs(pickups: list[NDArray], putdowns: list[NDArray], q: NDArray, held: NDArray) -> list[tuple[int, int]]:
+    """Which branch at the pickup with which at the putdown: those that turn the held joints least first, then the least joint motion."""
+
+    def cost(pair: tuple[int, int]) -> tuple[float, float]:
+        there, between = np.abs(pickups[pair[0]] - q), np.abs(putdowns[pair[1]] - pickups[pair[0]])
+        return float(there[held].sum() + between[held].sum()), float(there.max() + between.max())
+
+    return sorted(((a, b) for a in range(len(pickups)) for b in range(len(putdowns))), key=cost)
 
 
 def held_part(grasp: Grasp) -> Held:
@@ -116,8 +116,9 @@ def _carry(
 
     def free(world: World, a: NDArray, b: NDArray, opening: float, carried: Held | None, what: str) -> PathResult | None:
         progress.report(0.5, f"planning the arm's motion: {what}")
-        found = plan_path(world, a, b, opening, carried, rng=rng, progress=progress)
-        entry = ledger.add("arm motion", what, None if found.found else found.reason, parent=grasp.entry)
+        found = plan_path(world, a, b, opening, carried, options=PathOptions(straight=what != "transfer"), rng=rng, progress=progress)
+        holding = world.robot.holding(np.array([a, b]))
+        entry = ledger.add("arm motion", f"{what}, {holding}" if holding else what, None if found.found else found.reason, parent=grasp.entry)
         ledger.adopt(found.entries, parent=entry)
         return found if found.found else None
 

@@ -13,10 +13,10 @@ from handey_studio.world import Robot
 
 def move_report(results: list[MoveResult], robot: Robot) -> dict[str, Any]:
     """All MOVEs of one run."""
-    return {"schema": "handey/move/1", "robot": robot.name, "moves": [_move(result) for result in results]}
+    return {"schema": "handey/move/1", "robot": robot.name, "moves": [_move(result, robot) for result in results]}
 
 
-def _move(result: MoveResult) -> dict[str, Any]:
+def _move(result: MoveResult, robot: Robot) -> dict[str, Any]:
     plan = result.plan
     stages = {"destination", "grasp group", "grasp class", "approach group", "approach", "reach", "arm motion"}
     options = [entry for entry in result.ledger if entry.stage in stages]
@@ -30,7 +30,7 @@ def _move(result: MoveResult) -> dict[str, Any]:
         "T_world_part_reached": plain(result.T_world_part_reached),
         "grasp": _grasp(plan.grasp) if plan else None,
         "regrasps": plan.regrasps if plan else 0,
-        "steps": [_step(step) for step in plan.steps] if plan else [],
+        "steps": [_step(step, robot) for step in plan.steps] if plan else [],
         "certificate": certificate_report(plan.certificate) if plan else None,
         "options": {"tried": len(options), "rejected": rejected_counts(options)},
         "ledger": [entry_report(entry) for entry in result.ledger],
@@ -65,12 +65,14 @@ def _grasp(grasp: GraspChoice) -> dict[str, Any]:
     }
 
 
-def _step(step: Step) -> dict[str, Any]:
+def _step(step: Step, robot: Robot) -> dict[str, Any]:
+    """`held_joints` tells where the held joints of a redundant arm stand at the step's two ends."""
     return {
         "kind": step.kind,
         "joint_names": list(step.joint_names),
         "time_s": plain(step.time_s),
         "q_rad": plain(step.q_rad),
+        "held_joints": {robot.joint_names[k]: plain(step.q_rad[[0, -1], k]) for k in robot.held_index},
         "hand_opening_m": plain(step.hand_opening_m),
         "held": step.held,
         "T_hand_part": plain(step.T_hand_part),

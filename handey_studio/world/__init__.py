@@ -5,7 +5,8 @@ from handey_studio.world.library import Library
 from handey_studio.world.link_body import LinkBody
 from handey_studio.world.model_files import read_part, write_obj
 from handey_studio.world.part import Held, Mate, Part, PlacedPart
-from handey_studio.world.robot import FINGERS, Hand, Robot, load_robot
+from handey_studio.world.robot import FINGERS, Hand, Robot
+from handey_studio.world.robot_file import load_robot
 from handey_studio.world.world import EVERYWHERE, NO_TABLE, Block, ConvexBody, World
 
 __all__ = [

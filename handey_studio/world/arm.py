@@ -47,6 +47,8 @@ class Arm:
         """Axis (n, 3) of each joint in its own frame."""
         self.T_last_flange = frozen_array(self.model.frames[self.model.getFrameId(robot.flange)].placement.homogeneous)
         self.T_last_hand = frozen_array(self.T_last_flange @ robot.hand.T_flange_hand)
+        self.body_names = tuple(str(g.name) for g in collision.geometryObjects)
+        """Names of all collision bodies of the URDF, ignored ones too."""
         self.bodies = tuple(link_body(g) for g in collision.geometryObjects if g.name not in robot.ignored_bodies)
 
     @cached_property

@@ -9,7 +9,8 @@ from pathlib import Path
 from handey_studio.base.errors import unknown_name
 from handey_studio.world.model_files import MESH_SUFFIXES, read_part
 from handey_studio.world.part import Part
-from handey_studio.world.robot import Robot, load_robot
+from handey_studio.world.robot import Robot
+from handey_studio.world.robot_file import load_robot
 
 KINDS = ("robots", "parts", "sessions")
 
@@ -47,10 +48,14 @@ class Library:
         """A robot by its name, or a folder with a robot.toml."""
         if (Path(name) / "robot.toml").is_file():
             return load_robot(name)
-        known = self._named("robots", lambda path: (path / "robot.toml").is_file())
+        known = self.robot_folders()
         if name not in known:
             raise unknown_name("robot", name, known)
         return load_robot(known[name])
+
+    def robot_folders(self) -> dict[str, Path]:
+        """Name → folder with a robot.toml."""
+        return self._named("robots", lambda path: (path / "robot.toml").is_file())
 
     def part(self, name: str, scale: float = 1.0) -> Part:
         """A part by its name, or a mesh file [m × scale]."""
