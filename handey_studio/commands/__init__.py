@@ -5,6 +5,7 @@ A command imports the rooms that it needs when it runs: together they take secon
 
 from handey_studio.commands import (
     bench_locate,
+    bench_motion,
     bench_piles,
     fit_score,
     locate,
@@ -30,6 +31,7 @@ COMMANDS = (
     path,
     bench_piles,
     bench_locate,
+    bench_motion,
     fit_score,
     robot_check,
     robot_list,

@@ -292,7 +292,7 @@ def test_a_peer_sees_what_lies_above_the_table(labelled, toy):
     toy(True)
     alone = np.where(seen.body == 2, np.nan, seen.depth)  # the carton and the table
     scene = LabelledScene("a", DepthView(alone, camera.projection, T_WORLD_SENSOR), True, (CARTON,), judge=None)
-    with peers.PeerProcess() as process:
+    with peers.LocatePeers() as process:
         assert process.names == ("middle", "knowing")
         peer = peers.Peer(process, "middle")
         peer.see(scene)
@@ -309,23 +309,23 @@ def test_a_peer_sees_what_lies_above_the_table(labelled, toy):
 def test_without_peers_one_sentence_tells_how_to_get_them(toy):
     toy(False)
     with pytest.raises(BadInput, match=r"pip install 'handey-studio\[bench\]'"):
-        peers.PeerProcess()
+        peers.LocatePeers()
     with pytest.raises(BadInput, match="cannot be run"):
-        peers.PeerProcess("/nowhere/python")
+        peers.LocatePeers("/nowhere/python")
 
 
 def test_a_peer_process_that_ends_is_told(toy, tmp_path):
     toy(True)
     (tmp_path / "toy.py").write_text("import sys; sys.stdin.readline()")
     with pytest.raises(BadInput, match="ended at the request"):
-        peers.PeerProcess(sys.executable)
+        peers.LocatePeers(sys.executable)
 
 
 def test_a_worker_that_is_busy_is_not_waited_for(toy, tmp_path):
     toy(True)
     answer = json.dumps({"peers": ["sleeper"]})
     (tmp_path / "toy.py").write_text(f"import sys, time\nsys.stdin.readline()\nprint('{answer}', flush=True)\ntime.sleep(600)")
-    process = peers.PeerProcess()
+    process = peers.LocatePeers()
     begun = time.monotonic()
     process.close()
     assert time.monotonic() - begun < 60

@@ -10,7 +10,7 @@ from handey_studio.base import Progress
 from handey_studio.cell.scenes import CAMERA
 from handey_studio.task.bench_locate.answers import TOGETHER, Handey, Method
 from handey_studio.task.bench_locate.labelled_scenes import load_labelled, scene_folders, simulate
-from handey_studio.task.bench_locate.peers import Peer, PeerProcess
+from handey_studio.task.bench_locate.peers import LocatePeers, Peer
 from handey_studio.task.bench_locate.plot import check_plot, plot
 from handey_studio.task.bench_locate.run import bench_locate
 from handey_studio.world.library import Library
@@ -39,7 +39,7 @@ def run_bench(
     with ExitStack() as open_things:
         methods: list[Method] = [Handey(ask)]
         if peers or peer_python is not None:
-            process = open_things.enter_context(PeerProcess(peer_python))
+            process = open_things.enter_context(LocatePeers(peer_python))
             methods += [Peer(process, name, peer_poses) for name in process.names]
         if scenes is not None and seeds is None:
             folders = scene_folders(scenes)

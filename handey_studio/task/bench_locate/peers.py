@@ -1,12 +1,8 @@
 """Asking `peer_worker.py`, which runs in an interpreter of its own: the peers' packages need not mix with ours."""
 
-import json
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,66 +12,35 @@ from handey_studio.geometry import Polyhedron
 from handey_studio.sensing.support import support_plane
 from handey_studio.task.bench_locate.answers import Answer, Pose
 from handey_studio.task.bench_locate.labelled_scenes import LabelledScene
+from handey_studio.task.peer_process import PeerProcess
 from handey_studio.world.part import Part
 
 VOXELS_M = (0.003, 0.005)
 LEAST_FITNESS = 0.4  # of the model's points on the scene's: a sensor sees about half of a part
 SAMPLES = 20000  # points on a part's surface
 CLEARANCE_M = 0.004  # above the table, and at least three standard deviations: below is table
-PATIENCE_S = 2.0  # for a worker to end by itself
 WORKER = Path(__file__).with_name("peer_worker.py")
 HOW = (
     "pip install 'handey-studio[bench]' adds Open3D; OpenCV's point pairs need opencv-contrib-python-headless, in an environment of its own"
 )
 
 
-class PeerProcess:
-    """A running worker. Use it as a context; it ends with it."""
+class LocatePeers(PeerProcess):
+    """A worker that locates parts."""
 
     def __init__(self, python: str | None = None, voxels_m: Sequence[float] = VOXELS_M) -> None:
-        try:
-            self._process = subprocess.Popen(
-                [python or sys.executable, str(WORKER)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-            )
-        except OSError as error:
-            raise BadInput(f'--peer-python "{python}" cannot be run: {error.strerror}.') from None
+        super().__init__(WORKER, python)
         self._folder = tempfile.TemporaryDirectory(prefix="handey-peers-")
         self._known: set[Polyhedron] = set()
         self._scene: LabelledScene | None = None
         self.names: tuple[str, ...] = tuple(self.ask(do="hello", voxels_m=list(voxels_m))["peers"])
         if not self.names:
             self.close()
-            raise BadInput(f"no peer can be run by {python or sys.executable}: {HOW} (--peer-python names its interpreter).")
-
-    def __enter__(self) -> "PeerProcess":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+            raise BadInput(f"no peer can be run by {self.python}: {HOW} (--peer-python names its interpreter).")
 
     def close(self) -> None:
-        """End the worker and forget its files."""
-        if self._process.stdin is not None:
-            self._process.stdin.close()
-        try:
-            self._process.wait(timeout=PATIENCE_S)
-        except subprocess.TimeoutExpired:  # in the middle of a search that nobody waits for any more
-            self._process.kill()
-            self._process.wait()
+        super().close()
         self._folder.cleanup()
-
-    def ask(self, **request: Any) -> dict[str, Any]:
-        """One request, one answer. BadInput when the worker has ended."""
-        assert self._process.stdin is not None and self._process.stdout is not None
-        try:
-            self._process.stdin.write(json.dumps(request) + "\n")
-            self._process.stdin.flush()
-            answer = self._process.stdout.readline()
-        except BrokenPipeError:
-            answer = ""
-        if not answer:
-            raise BadInput(f'the peers\' process ended at the request "{request["do"]}"; its last lines on standard error tell why.')
-        return json.loads(answer)
 
     def show(self, scene: LabelledScene) -> None:
         """Give the worker a scene, once: its points, and which of them lie above the table."""
@@ -107,7 +72,7 @@ class Peer:
     """One of a worker's peers as a method: its best pose, and with `most` above one the next ones without what those before explain. It
     stands by a pose whose fitness is high enough. Its seconds are those of the first."""
 
-    def __init__(self, process: PeerProcess, name: str, most: int = 1) -> None:
+    def __init__(self, process: LocatePeers, name: str, most: int = 1) -> None:
         self._process, self.name, self._most = process, name, most
 
     def see(self, scene: LabelledScene) -> None:
