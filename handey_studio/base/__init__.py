@@ -2,7 +2,21 @@
 
 from handey_studio.base.arrays import Value, frozen_array
 from handey_studio.base.errors import BadInput
-from handey_studio.base.ledger import Entry, Ledger, describe, measured, rejected_counts
+from handey_studio.base.ledger import Entry, Ledger, describe, entry_report, finite, measured, rejected_counts
 from handey_studio.base.progress import Progress, Share, Silent
 
-__all__ = ["BadInput", "Entry", "Ledger", "Progress", "Share", "Silent", "Value", "describe", "frozen_array", "measured", "rejected_counts"]
+__all__ = [
+    "BadInput",
+    "Entry",
+    "Ledger",
+    "Progress",
+    "Share",
+    "Silent",
+    "Value",
+    "describe",
+    "entry_report",
+    "finite",
+    "frozen_array",
+    "measured",
+    "rejected_counts",
+]

@@ -7,7 +7,8 @@ screen, the command line's JSON and the tests read these same entries.
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -100,3 +101,13 @@ def describe(entry: Entry) -> str:
         text += f": {measured(entry.value, entry.unit)}"
         text += "" if entry.limit is None else f", limit {measured(entry.limit, entry.unit)}"
     return text
+
+
+def entry_report(entry: Entry) -> dict[str, Any]:
+    """An entry as JSON values: a number that is not finite is null."""
+    return asdict(entry) | {key: finite(getattr(entry, key)) for key in ("value", "limit")}
+
+
+def finite(value: float | None) -> float | None:
+    """A number as JSON has it; null when it is not finite."""
+    return float(value) if value is not None and math.isfinite(value) else None

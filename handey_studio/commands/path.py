@@ -24,7 +24,7 @@ def add_arguments(path: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.task.path import answer_path, path_report
+    from handey_studio.motion.answer import answer_path, path_report
 
     check_output(given.json)
     robot = Library.choose(given.library).robot(given.robot)

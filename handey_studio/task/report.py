@@ -1,12 +1,11 @@
 """Results as the JSON that other programs read (schema `handey/move/1`)."""
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from handey_studio.base import Entry, rejected_counts
-from handey_studio.motion import Certificate
+from handey_studio.base import entry_report, rejected_counts
+from handey_studio.motion.answer import certificate_report
 from handey_studio.task.plan import GraspChoice, MoveResult, Step
 from handey_studio.world import Robot
 
@@ -39,16 +38,6 @@ def _move(result: MoveResult, robot: Robot) -> dict[str, Any]:
     }
 
 
-def entry_report(entry: Entry) -> dict[str, Any]:
-    """An entry with its numbers as JSON has them: what is not finite is null."""
-    numbers = {key: _finite(getattr(entry, key)) for key in ("value", "limit")}
-    return asdict(entry) | numbers
-
-
-def _finite(value: float | None) -> float | None:
-    return float(value) if value is not None and np.isfinite(value) else None
-
-
 def _grasp(grasp: GraspChoice) -> dict[str, Any]:
     return {
         "class": grasp.name,
@@ -77,20 +66,6 @@ def _step(step: Step, robot: Robot) -> dict[str, Any]:
         "held": step.held,
         "T_hand_part": plain(step.T_hand_part),
         "allowed_contacts": [list(pair) for pair in step.allowed_contacts],
-    }
-
-
-def certificate_report(certificate: Certificate) -> dict[str, Any]:
-    """What was proved: the least clearance [m], where, between which bodies, and the margin that every pair keeps."""
-    return {
-        "proved": certificate.proved,
-        "least_clearance_m": _finite(certificate.least_clearance),
-        "bodies": list(certificate.bodies),
-        "at_stretch": certificate.at[0],
-        "at_share": certificate.at[1],
-        "margin_m": certificate.margin,
-        "exact_checks": certificate.checks,
-        "reason": certificate.reason,
     }
 
 

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from handey_studio.base import Progress, Silent
-from handey_studio.motion import PathOptions, PathResult, Trajectory, plan_path, time_path
-from handey_studio.task.report import certificate_report, entry_report, plain
+from handey_studio.base import Progress, Silent, entry_report, finite
+from handey_studio.motion.path import plan_path
+from handey_studio.motion.query import PathOptions
+from handey_studio.motion.results import Certificate, PathResult, Trajectory
+from handey_studio.motion.timing import time_path
 from handey_studio.world import Robot
 from handey_studio.world.envelope import enveloped
 from handey_studio.world.moveit import read_request, read_scene
@@ -54,10 +56,24 @@ def path_report(answer: PathAnswer) -> dict[str, Any]:
         "reason": result.reason,
         "needed": result.needed,
         "joint_names": list(answer.robot.joint_names),
-        "time_s": plain(trajectory.time_s) if trajectory else [],
-        "q_rad": plain(trajectory.q_rad) if trajectory else [],
-        "waypoints_rad": plain(result.q_rad),
+        "time_s": trajectory.time_s.tolist() if trajectory else [],
+        "q_rad": trajectory.q_rad.tolist() if trajectory else [],
+        "waypoints_rad": result.q_rad.tolist(),
         "certificate": certificate_report(result.certificate) if result.certificate else None,
         "ledger": [entry_report(entry) for entry in result.entries],
         "timing_s": answer.timing_s,
+    }
+
+
+def certificate_report(certificate: Certificate) -> dict[str, Any]:
+    """What was proved: the least clearance [m], where, between which bodies, and the margin that every pair keeps."""
+    return {
+        "proved": certificate.proved,
+        "least_clearance_m": finite(certificate.least_clearance),
+        "bodies": list(certificate.bodies),
+        "at_stretch": certificate.at[0],
+        "at_share": certificate.at[1],
+        "margin_m": certificate.margin,
+        "exact_checks": certificate.checks,
+        "reason": certificate.reason,
     }
