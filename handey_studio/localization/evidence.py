@@ -146,18 +146,25 @@ def sector_of(du, dv):
     return DIRECTIONS - sector if du < 0.0 and sector > 0 else sector
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def in_image(x, y, z, dx, dy, dz, camera):
+    """How the image of a point moves [px/m] when the point moves along (dx, dy, dz)."""
+    if camera[0] > 0.5:
+        return dx * camera[1], dy * camera[2]
+    near = 1.0 / z
+    return (dx - x * near * dz) * near * camera[1], (dy - y * near * dz) * near * camera[2]
+
+
 @njit(cache=True, error_model="numpy")
-def nearest_edge(x, y, z, ax, ay, az, nearest, edges, camera, pixel):
-    """Number of the nearest edge pixel of about the direction that (ax, ay, az) has in the image at a point, −1 for none, and its
-    distance [m] sideways."""
+def nearest_edge(x, y, z, du, dv, nearest, edges, camera):
+    """Number of the nearest edge pixel of about the direction (du, dv) in the image at a point, −1 for none, and its distance [m]
+    sideways."""
     u, v = project(x, y, z, camera)
     i, j = int(np.rint(u)), int(np.rint(v))
     if i < 0 or j < 0 or i >= nearest.shape[2] or j >= nearest.shape[1]:
         return -1, np.inf
-    step = 0.5 * pixel
-    u2, v2 = project(x + step * ax, y + step * ay, z + step * az, camera)
-    k = nearest[sector_of(u2 - u, v2 - v), j, i]
+    k = nearest[sector_of(du, dv), j, i]
     if k < 0:
         return -1, np.inf
-    du, dv = edges[k, U] - u, edges[k, V] - v
-    return k, np.sqrt(du * du + dv * dv) / pixels_per_metre(z, camera)
+    off_u, off_v = edges[k, U] - u, edges[k, V] - v
+    return k, np.sqrt(off_u * off_u + off_v * off_v) / pixels_per_metre(z, camera)

@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.edges import CONVEX
-from handey_studio.localization.evidence import KIND, Evidence, Limits, U, V, Z, nearest_edge, pixels_per_metre, project, ray_at
+from handey_studio.localization.evidence import KIND, Evidence, Limits, U, V, Z, in_image, nearest_edge, pixels_per_metre, project, ray_at
 from handey_studio.localization.samples import ALONG, INTO_LEFT, INTO_RIGHT, LEFT, RIGHT, PartSamples
 from handey_studio.localization.shares import shared
 
@@ -161,10 +161,11 @@ def edge_state(x, y, z, directions, e, concave, depth, nearest, edges, camera, p
     if not in_sight:
         return -1, -1, 0.0, left, right
     ax, ay, az = vector(directions, e, ALONG)
-    k, sideways = nearest_edge(x, y, z, ax, ay, az, nearest, edges, camera, pixel)
+    du, dv = in_image(x, y, z, ax, ay, az, camera)
+    k, sideways = nearest_edge(x, y, z, du, dv, nearest, edges, camera)
     close = k >= 0 and sideways <= limits.edge + 0.7 * pixel and abs(edges[k, Z] - z) <= limits.edge_depth
     ix, iy, iz = vector(directions, e, INTO_LEFT if left else INTO_RIGHT)
-    off = inwards(x, y, z, ax, ay, az, ix, iy, iz, edges[k, U], edges[k, V], camera, pixel) if close else 0.0
+    off = inwards(x, y, z, du, dv, ix, iy, iz, edges[k, U], edges[k, V], camera) if close else 0.0
     if left and right:
         return (1, k, off, left, right) if close else (0, -1, 0.0, left, right)
     # a silhouette: sensors lose readings there, they do not add any, and a surface that bends away in sight is none
@@ -178,17 +179,14 @@ def edge_state(x, y, z, directions, e, concave, depth, nearest, edges, camera, p
 
 
 @njit(cache=True, error_model="numpy")
-def inwards(x, y, z, ax, ay, az, ix, iy, iz, u_pixel, v_pixel, camera, step):
-    """How far [m] an edge pixel lies from an edge sample across the edge (ax, ay, az) in the image, positive towards the face that is
+def inwards(x, y, z, du, dv, ix, iy, iz, u_pixel, v_pixel, camera):
+    """How far [m] an edge pixel lies from an edge sample across the edge, (du, dv) in the image, positive towards the face that is
     seen, into which (ix, iy, iz) points."""
     u, v = project(x, y, z, camera)
-    ua, va = project(x + step * ax, y + step * ay, z + step * az, camera)
-    ui, vi = project(x + step * ix, y + step * iy, z + step * iz, camera)
-    nu, nv = va - v, u - ua
-    length = np.sqrt(nu * nu + nv * nv) + 1e-12
-    side = 1.0 if nu * (ui - u) + nv * (vi - v) > 0 else -1.0
-    off = (u_pixel - u) * nu + (v_pixel - v) * nv
-    return side * off / length / pixels_per_metre(z, camera)
+    iu, iv = in_image(x, y, z, ix, iy, iz, camera)
+    side = 1.0 if dv * iu - du * iv > 0 else -1.0
+    off = (u_pixel - u) * dv - (v_pixel - v) * du
+    return side * off / (np.sqrt(du * du + dv * dv) * pixels_per_metre(z, camera) + 1e-12)
 
 
 @njit(cache=True, error_model="numpy")
