@@ -14,7 +14,7 @@ from handey_studio.motion.random_trees import grow_trees
 from handey_studio.motion.results import CSpaceSummary, Leg, PathResult
 from handey_studio.motion.shortcut import Route, shorten
 from handey_studio.motion.three_legs import three_legs
-from handey_studio.motion.wrist_ways import wrist_ways
+from handey_studio.motion.wrist_ways import held_stretches, wrist_ways
 from handey_studio.world import Held, World
 from handey_studio.world.collision import Pairs
 
@@ -80,7 +80,7 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
     ways = wrist_ways(asked, rng, 2)
     if not ways:
         yield Attempt("wrist", nothing, [], None, "the wrist finds no way to turn that keeps the hand off the arm")
-    plans = [(step, name, stack) for step in asked.options.steps_deg for name, way in ways for stack in _stacks(way)]
+    plans = [(step, name, stack) for step in asked.options.steps_deg for name, way in ways for stack in _stacks(asked, way, step)]
     for k, (step, name, (stacked, ways_of_layers)) in enumerate(plans):
         progress.report(k / (len(plans) + 1), f"configuration space of the arm joints, {step:g}° cells")
         found = three_legs(asked, layers_of(asked, ways_of_layers, float(np.deg2rad(step))))
@@ -92,8 +92,17 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
     yield Attempt(f"random trees, {growths} growths", points, movers, None, why)
 
 
-def _stacks(way: NDArray) -> list[tuple[str, list[NDArray]]]:
-    """The layers for one way of the wrist: the paper's one box; and the wrist as it is at both ends in layers of their own."""
+def _stacks(asked: Query, way: NDArray, step: float) -> list[tuple[str, list[NDArray]]]:
+    """The layers for one way of the wrist: the paper's one box; and the wrist as it is at both ends in layers of their own.
+
+    A held joint that turns far moves the arm itself: a layer for each stretch of its turn. So many layers of fine cells would take longer
+    than random trees do, so they have the widest cells only.
+    """
+    robot = asked.world.robot
+    stretches = held_stretches(robot, way)
+    if len(stretches) > 1:
+        name = f"{robot.holding(np.array([asked.start, asked.goal]))} in {len(stretches)} layers"
+        return [(name, [way[:1], *stretches, way[-1:]])] if step == asked.options.steps_deg[0] else []
     return [("", [way]), ("a layer for each end", [way[:1], way, way[-1:]])]
 
 

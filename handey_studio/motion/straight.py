@@ -29,9 +29,9 @@ def straight_path(
 ) -> PathResult:
     """The hand through poses (k, 4, 4), a few millimetres apart, from `q_start` (joints,) [rad], with the fingers `opening` [m] apart.
 
-    Follows the branch of the inverse kinematics that `q_start` is on; held joints stay as they are there. The margin kept is `margin` [m], or half of the least
-    clearance at the poses where that is less; the certificate tells. Fails, with the place and the reason, where a pose is out of
-    reach, a joint would jump or leave its limits, or bodies meet that are not in `allowed`.
+    Follows the branch of the inverse kinematics that `q_start` is on; held joints stay as they are there. The margin kept is `margin` [m],
+    or half of the least clearance at the poses where that is less; the certificate tells. Fails, with the place and the reason, where a
+    pose is out of reach, a joint would jump or leave its limits, or bodies meet that are not in `allowed`.
     """
     hands = np.asarray(T_world_hands, dtype=float)
     q_start = np.asarray(q_start, dtype=float)

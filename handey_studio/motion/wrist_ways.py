@@ -4,15 +4,19 @@ The paper interpolates; where that makes the wrist or the hand pass through the 
 arm joints helps, and the wrist goes by way of another posture.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.motion.certificate import Mover
 from handey_studio.motion.proof import PROVED, Motion, Verdict, prove
 from handey_studio.motion.query import Query
+from handey_studio.world import Robot
 from handey_studio.world.collision_bodies import terrain_obstacles
 from handey_studio.world.collision_queries import Scene
 
+HELD_RAD = float(np.deg2rad(12.0))  # a held joint that turns by more than this sweeps the arm through too much space
 DRAWN = 200  # wrist postures drawn at random when the straight way is closed
 
 
@@ -42,6 +46,18 @@ def wrist_ways(query: Query, rng: np.random.Generator, most: int) -> list[tuple[
         if wrist_turns(query.free, start, between[k]) and wrist_turns(query.free, between[k], goal):
             ways.append((names.get(int(k), "another wrist posture in between"), np.array([start, between[k], goal])))
     return ways
+
+
+def held_stretches(robot: Robot, way: NDArray) -> list[NDArray]:
+    """A way (m, joints − 3) [rad] in stretches in which no held joint turns by more than `HELD_RAD`; one, where none turns so far."""
+    held = np.isin(robot.other_index, robot.held_index)
+    if np.ptp(way[:, held], axis=0).max(initial=0.0) <= HELD_RAD:
+        return [way]
+    points = [way[0]]
+    for a, b in pairwise(way):
+        parts = max(1, int(np.ceil(np.abs(b - a)[held].max() / HELD_RAD)))
+        points += [a + (b - a) * (k / parts) for k in range(1, parts + 1)]
+    return [np.array(pair) for pair in pairwise(points)]
 
 
 def wrist_turns(mover: Mover, start: NDArray, end: NDArray) -> bool:
