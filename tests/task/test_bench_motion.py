@@ -41,6 +41,8 @@ def folder(tmp_path):
     place.mkdir(parents=True)
     (place / "01.scene.yaml").write_text(yaml.safe_dump(scene_of(PILLAR)))
     (place / "01.request.yaml").write_text(yaml.safe_dump(request_of(START, GOAL)))
+    (place / "03.scene.yaml").write_text(yaml.safe_dump(scene_of(PILLAR)))
+    (place / "03.request.yaml").write_text(yaml.safe_dump(request_of(START, [0.0, *GOAL[1:]])))
     (place / "02.scene.yaml").write_text(yaml.safe_dump(scene_of(body("sphere", [0.05], (0.3, 0.3, 2.0)))))
     (place / "02.request.yaml").write_text(yaml.safe_dump(request_of(START, START)))
     return tmp_path / "problems"
@@ -48,7 +50,7 @@ def folder(tmp_path):
 
 def test_problems_come_in_families(folder):
     (folder / "stray.scene.yaml").write_text("world: {}")
-    first, second = read_problems(problem_files(folder), folder, ROBOT)
+    first, second, _ = read_problems(problem_files(folder), folder, ROBOT)
     assert (first.family, first.name, second.name) == ("pillars", "01", "02")
     assert list(first.world.robot.hand.boxes(0.0)) == ["hand"]
     with pytest.raises(BadInput, match="no folder"):
@@ -113,8 +115,9 @@ def test_the_command_beside_a_toy_peer(folder, tmp_path, monkeypatch, capsys):
     told = capsys.readouterr().out
     assert "COLLIDES" in told and "Handey" in told and "2 of 2" in told
     summary = json.loads(out.read_text())["summary"]
+    assert summary["Handey"]["all"]["no_free_ends"] == 1
     assert summary["Handey"]["all"]["solved"] == 2 and summary["Handey"]["all"]["colliding"] == 0
-    assert summary["straight"]["all"]["colliding"] == 1 and summary["silent"]["all"]["solved"] == 0
+    assert summary["straight"]["all"]["colliding"] == 2 and summary["silent"]["all"]["solved"] == 0
 
 
 def test_what_cannot_be_measured_is_told_before_any_work(folder, capsys):
@@ -126,10 +129,12 @@ def test_what_cannot_be_measured_is_told_before_any_work(folder, capsys):
 def test_summary_of_rows():
     def row(method, name, seconds, length_rad=None, collisions=()):
         found = {"length_rad": length_rad, "clearance_m": 0.01, "collisions": list(collisions)} if length_rad is not None else {}
-        return {"method": method, "family": "f", "name": name, "seed": 0, "seconds": seconds, "found": length_rad is not None} | found
+        return {"method": method, "family": "f", "name": name, "seed": 0, "ends_free": name != "3", "seconds": seconds,
+                "found": length_rad is not None} | found  # fmt: skip
 
-    rows = [row("a", "1", 1.0, 4.0), row("a", "2", 3.0, 8.0), row("b", "1", 2.0, 5.0, [{}]), row("b", "2", 9.0)]
+    rows = [row("a", "1", 1.0, 4.0), row("a", "2", 3.0, 8.0), row("b", "1", 2.0, 5.0, [{}]), row("b", "2", 9.0), row("a", "3", 0.1)]
     numbers = summarise(rows)
     assert (numbers["a"]["all"]["solved"], numbers["b"]["all"]["solved"], numbers["b"]["all"]["colliding"]) == (2, 1, 1)
     assert numbers["a"]["all"]["length_rad"]["median"] == 6.0 and numbers["a"]["all"]["length_together_rad"]["median"] == 4.0
-    assert len(table(numbers)) == 3 and table({}) == ["no problem was measured"]
+    assert (numbers["a"]["all"]["asked"], numbers["a"]["all"]["no_free_ends"]) == (2, 1)
+    assert len(table(numbers)) == 4 and "1 more begin" in table(numbers)[-1] and table({}) == ["no problem was measured"]

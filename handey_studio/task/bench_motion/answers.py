@@ -64,6 +64,13 @@ def judged(problem: Problem, answer: Answer) -> dict[str, Any]:
     return row | {"length_rad": length(answer.path), "clearance_m": clearance, "collisions": collisions, "q_rad": answer.path.tolist()}
 
 
+def ends_free(problem: Problem) -> bool:
+    """Whether the start and the goal are within the joints' limits and free."""
+    model, robot = collision_model(problem.world), problem.world.robot
+    ends = (problem.start, problem.goal)
+    return all(robot.limit_margin(q) >= 0 and model.in_contact(q, problem.opening, problem.held) is None for q in ends)
+
+
 def least_clearance(problem: Problem, path: NDArray) -> float:
     """The least distance [m] that is measured on a path, 0 where bodies meet: between the links' convex pieces and everything else."""
     model, least = collision_model(problem.world), 1.0

@@ -67,6 +67,8 @@ class Ompl(Bodies):
 
     def plan(self, start: NDArray, goal: NDArray, seed: int) -> NDArray:
         n = self.model.nq
+        if not (self.free(start) and self.free(goal)):  # it would wait for another goal until its time is over
+            return np.empty((0, n))
         space = self.base.RealVectorStateSpace(n)
         bounds = self.base.RealVectorBounds(n)
         for i in range(n):

@@ -9,7 +9,7 @@ from typing import Any
 
 from handey_studio.base import BadInput, Progress
 from handey_studio.task.bench_locate.plot import check_plot
-from handey_studio.task.bench_motion.answers import Handey, Method, judged
+from handey_studio.task.bench_motion.answers import Handey, Method, ends_free, judged
 from handey_studio.task.bench_motion.peers import MotionPeers, Peer
 from handey_studio.task.bench_motion.plot import plot
 from handey_studio.task.bench_motion.problems import Problem, problem_files, read_problems
@@ -65,7 +65,8 @@ def bench_motion(
         if progress.cancelled:
             break
         progress.report(number / max(count, 1), f"{problem.family} {problem.name}")
-        asked = [_row(problem, method, seed) for seed in seeds for method in methods]
+        free = ends_free(problem)
+        asked = [_row(problem, method, seed) | {"ends_free": free} for seed in seeds for method in methods]
         tell(_line(problem, asked))
         rows += asked
     summary = summarise(rows)

@@ -11,7 +11,8 @@ Row = dict[str, Any]
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     """Numbers of each method over all families and of each one, in the order in which they come: {method: {"all" or family: numbers}}.
 
-    Times and lengths are those of found paths; `length_together_rad` is over the problems that every method solved.
+    Problems that begin or end in collision are counted apart, in `no_free_ends`. Times and lengths are those of found paths;
+    `length_together_rad` is over the problems that every method solved.
     """
     methods, families = _names(rows, "method"), _names(rows, "family")
     everyone = _solved_by_all(rows, methods)
@@ -39,7 +40,8 @@ def _solved_by_all(rows: Sequence[Row], methods: Sequence[str]) -> set[tuple[str
 def _numbers(rows: Sequence[Row], everyone: set[tuple[str, str, int]]) -> dict[str, Any]:
     found = [row for row in rows if row["found"]]
     return {
-        "asked": len(rows),
+        "asked": sum(row["ends_free"] for row in rows),
+        "no_free_ends": sum(not row["ends_free"] for row in rows),
         "solved": len(found),
         "colliding": sum(bool(row["collisions"]) for row in found),
         "seconds": _spread([row["seconds"] for row in found]),
@@ -67,7 +69,8 @@ def table(summary: dict[str, Any]) -> list[str]:
     families = next(iter(summary.values()))
     for family in families if len(families) > 2 else ("all",):
         lines += [f"{name:{width}}{family:{width}}" + _cells(numbers[family]) for name, numbers in summary.items()]
-    return lines
+    left_out = families["all"]["no_free_ends"]
+    return [*lines, f"{left_out} more begin or end in collision"] if left_out else lines
 
 
 def _cells(numbers: dict[str, Any]) -> str:
