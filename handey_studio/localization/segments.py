@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
+from handey_studio.localization.dropouts import over_dropouts
 from handey_studio.localization.edges import KIND_NAMES, EdgePixels
 from handey_studio.localization.flanks import Seen
 from handey_studio.localization.lines import Line
@@ -80,6 +81,7 @@ def link(view: DepthView, surface: Surface, edges: EdgePixels) -> Linked:
     segment = _grow(number, u, v, kind, depth, theta, order, (across, gate, MAX_TURN, 3.0 if ragged else 2.0))
     seen = Seen(depth, surface.slope, camera_of(view.projection), (view.noise, surface.typical), surface.radius_px, view.outline_error)
     lines, segment = straight_lines(seen, edges.outward, kind, u, v, segment)
+    lines, segment = over_dropouts(view, seen, edges.outward, kind, u, v, lines, segment)
     return Linked(u, v, kind, segment, lines)
 
 
