@@ -36,11 +36,12 @@ class _Cut:
 def convex_cover(vertices: NDArray, triangles: NDArray, options: CoverOptions = CoverOptions()) -> tuple[NDArray, ...]:
     """Corners (k, 3) [m] of convex pieces that together hold the solid inside a surface: vertices (n, 3) [m], triangles (m, 3).
 
-    The surface may be several closed ones that cross each other. One that does not close is taken for its hull.
+    The surface may be several closed ones that cross each other. One that does not close is cut across its longest side only, where the
+    hull of what of the surface is in a slab holds all that it encloses there.
     """
     solid = _solid(vertices, triangles)
     if solid is None:
-        return (frozen_array(vertices[ConvexHull(vertices).vertices]),)
+        return _slabs(vertices, _edges(triangles), options)
     pieces = [(solid, _best_cut(solid, options))]
     while len(pieces) < options.most:
         piece, cut = max(pieces, key=lambda pair: pair[1].saves)
@@ -73,15 +74,13 @@ def _hull_corners(solid: manifold3d.Manifold) -> NDArray:
 def _best_cut(solid: manifold3d.Manifold, options: CoverOptions) -> _Cut:
     """The cut that saves most; one that saves nothing when the piece is all but its own hull."""
     points, triangles = _arrays(solid)
-    edges = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    edges = _edges(triangles)
     whole = _hull_volume(points)
     best = _Cut(0.0)
     if whole - solid.volume() < options.least_air:
         return best
     for axis in range(3):
-        low, high = points[:, axis].min(), points[:, axis].max()
-        count = min(options.planes, int((high - low) / options.spacing) - 1)
-        for place in np.linspace(low, high, count + 2)[1:-1] if count > 0 else ():
+        for place in _places(points[:, axis].min(), points[:, axis].max(), options):
             crossing = _crossing(points, edges, axis, place)
             above = points[:, axis] >= place
             halves = (np.concatenate([points[side], crossing]) for side in (above, ~above))
@@ -89,6 +88,42 @@ def _best_cut(solid: manifold3d.Manifold, options: CoverOptions) -> _Cut:
             if saves > best.saves:
                 best = _Cut(saves, axis, float(place))
     return best
+
+
+def _slabs(points: NDArray, edges: NDArray, options: CoverOptions) -> tuple[NDArray, ...]:
+    """Corners (k, 3) [m] of the hulls of slabs of a surface across its longest side, cut where that saves most."""
+    axis = int(np.argmax(np.ptp(points, axis=0)))
+
+    def within(low: float, high: float) -> NDArray:
+        inside = points[(points[:, axis] >= low) & (points[:, axis] <= high)]
+        return np.concatenate([inside, _crossing(points, edges, axis, low), _crossing(points, edges, axis, high)])
+
+    def best(low: float, high: float) -> tuple[float, float]:
+        whole = _hull_volume(within(low, high))
+        saved = [(whole - _hull_volume(within(low, p)) - _hull_volume(within(p, high)), float(p)) for p in _places(low, high, options)]
+        return max(saved, default=(0.0, low))
+
+    ends = (float(points[:, axis].min()), float(points[:, axis].max()))
+    slabs = {ends: best(*ends)}
+    while len(slabs) < options.most:
+        (low, high), (saves, place) = max(slabs.items(), key=lambda slab: slab[1][0])
+        if saves < options.least_air:
+            break
+        del slabs[low, high]
+        slabs |= {half: best(*half) for half in ((low, place), (place, high))}
+    hulls = [within(*slab) for slab in sorted(slabs)]
+    return tuple(frozen_array(hull[ConvexHull(hull).vertices]) for hull in hulls)
+
+
+def _places(low: float, high: float, options: CoverOptions) -> NDArray:
+    """Where a cut between two ends [m] is tried."""
+    count = min(options.planes, int((high - low) / options.spacing) - 1)
+    return np.linspace(low, high, max(count, 0) + 2)[1:-1]
+
+
+def _edges(triangles: NDArray) -> NDArray:
+    """The edges (e, 2) of triangles (m, 3), each once."""
+    return np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
 
 
 def _crossing(points: NDArray, edges: NDArray, axis: int, place: float) -> NDArray:

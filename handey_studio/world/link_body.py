@@ -19,7 +19,7 @@ from handey_studio.geometry.cover import CoverOptions, convex_cover
 from handey_studio.geometry.round_bodies import cuboid, cylinder, sphere
 from handey_studio.geometry.transforms import apply
 
-METHOD = 1  # counts the ways in which pieces were made: those kept by another one are not used
+METHOD = 2  # counts the ways in which pieces were made: those kept by another one are not used
 
 
 @dataclass(frozen=True)

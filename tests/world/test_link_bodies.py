@@ -59,6 +59,10 @@ def test_solids_that_cross_and_surfaces_that_do_not_close():
     assert beyond(vertices, pieces) < 1e-9 and sum(ConvexHull(piece).volume for piece in pieces) < 2.2e-3
     (open_box,) = convex_cover(bars[0].vertices, bars[0].triangles[:-1])
     assert len(open_box) == 8
+    tee = prism([(0, 0), (0.1, 0), (0.1, 0.2), (0.6, 0.2), (0.6, 0.3), (0, 0.3)], 0.1)
+    pieces = convex_cover(tee.vertices, tee.triangles[:-1])
+    assert beyond(on_surface(tee.vertices, tee.triangles, 2000, np.random.default_rng(2)), pieces) < 1e-9
+    assert sum(ConvexHull(piece).volume for piece in pieces) < 0.0085 < ConvexHull(tee.vertices).volume
 
 
 @pytest.mark.parametrize("radius", [0.002, 0.03, 0.2])
