@@ -46,6 +46,12 @@ class Mover:
         """Whether the straight motion between two configurations is proved to keep the margin."""
         return self.verdict(q_start, q_end).outcome == PROVED
 
+    def obstacle(self, q_start: NDArray, q_end: NDArray) -> tuple[str, ...]:
+        """The two bodies that keep the straight motion between two configurations from being proved; none when it is."""
+        verdict = self.verdict(q_start, q_end)
+        hit = Hit(*verdict.hit)
+        return () if verdict.outcome == PROVED or hit.kind < 0 else self.model.pair(hit, self.bodies)
+
     def verdict(self, q_start: NDArray, q_end: NDArray, openings: tuple[float, float] | None = None, nearest: float = 0.0) -> Verdict:
         start, end = openings or (self.opening, self.opening)
         # Copies: a read-only array is another type to the compiler, and would compile everything anew.

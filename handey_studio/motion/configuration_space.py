@@ -14,26 +14,29 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.motion.certificate import Mover
+from handey_studio.motion.certificate import mover as mover_of
 from handey_studio.motion.distance_field import distance_field
 from handey_studio.motion.forbidden_ranges import first_ranges, second_ranges, third_ranges
 from handey_studio.motion.self_collision import self_blocked
 from handey_studio.motion.turning import Between, angle_table, carried_circles, hinges_of, link_circles, reach_of
-from handey_studio.motion.wrist_box import WristBox
-from handey_studio.world import Robot, World
+from handey_studio.motion.wrist_box import WristBox, wrist_box
+from handey_studio.world import Held, Robot, World
 
 TURN = 2 * np.pi
+COARSEST = float(np.deg2rad(5.1))  # cells wider than this leave too much in doubt to be worth while
 REACH = 0.75 * TURN  # the way round the other side, and a quarter turn to spare
 
 
 @dataclass(frozen=True)
 class Extent:
-    """The cells of joints 1–3: cell k of joint i, of `counts[i]`, is centred at `lower[i] + (k + ½)·step` [rad].
+    """The cells of joints 1–3: cell k of joint i, of `counts[i]`, is centred at `limits[i] + (first[i] + k + ½)·step` [rad].
 
     After a turn they repeat.
     """
 
     step: float
-    lower: tuple[float, ...]
+    limits: tuple[float, ...]
+    first: tuple[int, ...]
     counts: tuple[int, ...]
 
     @property
@@ -42,14 +45,18 @@ class Extent:
         return round(TURN / self.step)
 
     @property
+    def lower(self) -> NDArray:
+        """Where the first cells begin (3,) [rad]."""
+        return np.array(self.limits) + np.array(self.first) * self.step
+
+    @property
     def centres(self) -> tuple[NDArray, ...]:
         """Centres [rad] of the cells of each joint."""
         return tuple(self.lower[i] + (np.arange(n) + 0.5) * self.step for i, n in enumerate(self.counts))
 
-    @property
-    def once(self) -> tuple[NDArray, ...]:
-        """The same, up to one turn."""
-        return tuple(centres[: self.turn] for centres in self.centres)
+    def of_one_turn(self, cells: NDArray) -> NDArray:
+        """These cells, given all from the joints' limits on up to one turn."""
+        return cells[np.ix_(*((first + np.arange(n)) % self.turn for first, n in zip(self.first, self.counts, strict=True)))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +82,7 @@ class ConfigurationSpace(Value):
 
     def centre(self, cells: NDArray) -> NDArray:
         """Angles (..., 3) [rad] of cells (..., 3)."""
-        return np.array(self.extent.lower) + (np.asarray(cells) + 0.5) * self.extent.step
+        return self.extent.lower + (np.asarray(cells) + 0.5) * self.extent.step
 
     def at(self, cell: NDArray, q: NDArray) -> NDArray:
         """The configuration q (n,) with its arm joints in the centre of a cell."""
@@ -90,43 +97,98 @@ def extent_around(robot: Robot, step: float, around: NDArray | None = None) -> E
     No farther than `REACH` from configurations `around` (m, joints) [rad] when they are given: beyond that it is the same arm a turn on.
     """
     arm = robot.arm_index
-    lower, upper = robot.lower[arm], robot.upper[arm]
+    lower, upper, first = robot.lower[arm], robot.upper[arm], np.zeros(3, int)
     if around is not None:
-        lower = lower + step * np.floor(np.maximum(around[:, arm].min(axis=0) - REACH - lower, 0.0) / step)
+        first = np.floor(np.maximum(around[:, arm].min(axis=0) - REACH - lower, 0.0) / step).astype(int)
         upper = np.minimum(upper, around[:, arm].max(axis=0) + REACH)
-    counts = np.maximum(np.floor((upper - lower) / step + 1e-9).astype(int), 1)
-    return Extent(step, tuple(lower.tolist()), tuple(counts.tolist()))
+    counts = np.maximum(np.floor((upper - lower) / step + 1e-9).astype(int) - first, 1)
+    return Extent(step, tuple(lower.tolist()), tuple(first.tolist()), tuple(counts.tolist()))
 
 
-def configuration_space(mover: Mover, box: WristBox, extent: Extent) -> ConfigurationSpace:
-    """The space of a mover's arm whose wrist is enclosed by a box.
+def configuration_space(mover: Mover, wrists: NDArray, extent: Extent) -> tuple[ConfigurationSpace, WristBox]:
+    """The space of a mover's arm while its other joints run through `wrists` (m, joints − 3) [rad], and the wrist box.
 
-    Where the arm's own bodies are compared the other joints are as in the middle of the box's way.
+    Where the arm's own bodies are compared the other joints are as in the middle of their way.
     """
-    world, wrists, once = mover.model.world, box.wrists, extent.once
-    robot = world.robot
-    held = Between.of(robot, wrists)
-    reach = reach_of(robot, box)
-    rows, links = _link_ranges(world, mover.margin, extent, held, reach)
-    blocked = links.copy()
-    carried = carried_circles(robot, box, mover.margin, held, extent.step)
-    turns = angle_table(once[2])
-    third_ranges(distance_field(world, reach), hinges_of(robot, held), carried, (once[0], once[1]), turns, extent.step, rows, blocked)
-    middle = wrists[len(wrists) // 2] if len(wrists) > 2 else wrists.mean(axis=0)
-    blocked |= self_blocked(mover, once[1], once[2], middle)[None]
-    if max(extent.counts) > extent.turn:
-        blocked = blocked[np.ix_(*(np.arange(n) % extent.turn for n in extent.counts))]
-    return ConfigurationSpace(extent, robot.arm_index, blocked)
+    robot = mover.model.world.robot
+    way = tuple(tuple(posture) for posture in wrists.tolist())
+    carried = Carried(mover.model.world, mover.margin, mover.opening, mover.held, way)
+    blocked = _scene_cells(carried, extent.step) | _own_cells(carried, extent.step)[None]
+    return ConfigurationSpace(extent, robot.arm_index, extent.of_one_turn(blocked)), _box(carried)
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What a space hangs on: the world, the margin [m], and what the wrist carries along its way."""
+
+    world: World
+    margin: float
+    opening: float
+    held: Held | None
+    way: tuple[tuple[float, ...], ...]
+
+
+@lru_cache(maxsize=64)
+def _box(carried: Carried) -> WristBox:
+    return wrist_box(carried.world.robot, np.array(carried.way), carried.opening, carried.held)
+
+
+@lru_cache(maxsize=16)
+def _scene_cells(carried: Carried, step: float) -> NDArray:
+    """Cells (n1, n2, n3), all within the limits up to one turn, that the scene does not leave wholly free; kept in this process.
+
+    Only those are looked at which the cells of twice their width, up to `COARSEST`, leave in doubt.
+    """
+    world, box = carried.world, _box(carried)
+    robot, values = world.robot, _values(world.robot, step)
+    held, reach = Between.of(robot, box.wrists), reach_of(robot, box)
+    rows, links = _link_cells(world, carried.margin, step, held, reach)
+    doubt = _doubt(_scene_cells(carried, 2 * step) if 2 * step < COARSEST else None, links.shape)
+    blocked, turns = links.copy(), angle_table(values[2])
+    circles = carried_circles(robot, box, carried.margin, held, step)
+    third_ranges(distance_field(world, reach), hinges_of(robot, held), circles, (values[0], values[1]), turns, step, rows, doubt, blocked)
+    return blocked
 
 
 @lru_cache(maxsize=8)
-def _link_ranges(world: World, margin: float, extent: Extent, held: Between, reach: float) -> tuple[NDArray, NDArray]:
+def _link_cells(world: World, margin: float, step: float, held: Between, reach: float) -> tuple[NDArray, NDArray]:
     """What links up to the carrier meet: rows (n1, n2) forbidden by those before it, and cells (n1, n2, n3), up to one turn each."""
-    robot, once, step = world.robot, extent.once, extent.step
-    hinges, turns, field = hinges_of(robot, held), [angle_table(values) for values in once], distance_field(world, reach)
+    robot, values = world.robot, _values(world.robot, step)
+    hinges, turns, field = hinges_of(robot, held), [angle_table(angles) for angles in values], distance_field(world, reach)
     first, second, third = (link_circles(robot, stage, margin, held, step) for stage in range(3))
-    rows = second_ranges(field, hinges, second, once[0], turns[1], step, first_ranges(field, hinges, first, turns[0], step))
-    blocked = np.zeros((len(once[0]), len(once[1]), len(once[2])), bool)
+    rows = second_ranges(field, hinges, second, values[0], turns[1], step, first_ranges(field, hinges, first, turns[0], step))
+    blocked = np.zeros((len(values[0]), len(values[1]), len(values[2])), bool)
     blocked[rows] = True
-    third_ranges(field, hinges, third, (once[0], once[1]), turns[2], step, rows, blocked)
+    doubt = _doubt(_link_cells(world, margin, 2 * step, held, reach)[1] if 2 * step < COARSEST else None, blocked.shape)
+    third_ranges(field, hinges, third, (values[0], values[1]), turns[2], step, rows, doubt, blocked)
     return rows, blocked
+
+
+@lru_cache(maxsize=32)
+def _own_cells(carried: Carried, step: float) -> NDArray:
+    """Cells (n2, n3) in which the arm meets itself, seen at the centres of the coarsest cells."""
+    robot = carried.world.robot
+    values = _values(robot, step)
+    if 2 * step < COARSEST:
+        return _doubt(_own_cells(carried, 2 * step), (len(values[1]), len(values[2])))
+    way = np.array(carried.way)
+    middle = way[len(way) // 2] if len(way) > 2 else way.mean(axis=0)
+    mine = mover_of(carried.world, carried.opening, carried.held, (), carried.margin)
+    return self_blocked(mine, values[1], values[2], middle)
+
+
+def _values(robot: Robot, step: float) -> tuple[NDArray, ...]:
+    """Centres [rad] of all cells within the limits, up to one turn."""
+    extent = extent_around(robot, step)
+    return tuple(centres[: extent.turn] for centres in extent.centres)
+
+
+def _doubt(coarse: NDArray | None, shape: tuple[int, ...]) -> NDArray:
+    """Cells that are not known to be free from blocked cells of twice their width; all, if there are none."""
+    doubt = np.ones(shape, bool)
+    if coarse is not None:
+        for axis in range(coarse.ndim):
+            coarse = coarse.repeat(2, axis=axis)
+        inside = tuple(slice(min(a, b)) for a, b in zip(shape, coarse.shape, strict=True))
+        doubt[inside] = coarse[inside]
+    return doubt

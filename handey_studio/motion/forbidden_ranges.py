@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.motion.cores import share
 from handey_studio.motion.distance_field import Field, clearance_at
 
 
@@ -133,9 +134,12 @@ def march(
     step: float,
     need: NDArray,
     known: NDArray,
+    doubt: NDArray,
     blocked: NDArray,
 ) -> None:
-    """Marks the forbidden cells of a row (n,), given its circles `local` (k, 9) in a frame that T (4, 4) maps to the world.
+    """Marks those cells of a row (n,) that are forbidden of those in `doubt` (n,).
+
+    Its circles are `local` (k, 9) in a frame that T (4, 4) maps to the world.
 
     Each group's big ball goes first; the small ones look only at cells where it lacks clearance. `need` (k, n) [m] is filled in for the
     small ones of a group when first asked for, and `known` (groups,) tells which.
@@ -147,7 +151,7 @@ def march(
     for group in range(groups):
         begin, end, big = these.first[group], these.first[group + 1], small + group
         near[:] = False
-        free[:] = ~blocked
+        free[:] = doubt & ~blocked
         turn_circles(T, local[big : big + 1], circle)
         if not _march_ball(field, circle[0], these.distance[big], turns, need[big], step, free, near):
             continue
@@ -197,7 +201,7 @@ def first_ranges(field: Field, hinges: Hinges, these: Circles, turns: NDArray, s
     place(np.eye(4), these, local)
     before = np.empty((0, 6))
     needs(local, these, k - groups, k, turns, before, step / 2, need)
-    march(field, hinges.T_world_first, local, these, turns, before, step, need, np.zeros(groups, np.bool_), blocked)
+    march(field, hinges.T_world_first, local, these, turns, before, step, need, np.zeros(groups, np.bool_), np.ones(n, np.bool_), blocked)
     return blocked
 
 
@@ -221,17 +225,16 @@ def second_ranges(field: Field, hinges: Hinges, these: Circles, values: NDArray,
     before = np.empty((1, 6))
     before[0] = _axis(np.eye(4), hinges.axes[0])
     needs(local, these, k - groups, k, turns, before, step / 2, need)
-    told = np.zeros(groups, np.bool_)
+    told, doubt = np.zeros(groups, np.bool_), np.ones(n2, np.bool_)
     for i in range(n1):
         if known[i]:
             blocked[i] = True
             continue
         T = turned(hinges.T_world_first, hinges.axes[0], values[i])
-        march(field, T, local, these, turns, before, step, need, told, blocked[i])
+        march(field, T, local, these, turns, before, step, need, told, doubt, blocked[i])
     return blocked
 
 
-@njit(cache=True)
 def third_ranges(
     field: Field,
     hinges: Hinges,
@@ -240,26 +243,45 @@ def third_ranges(
     turns: NDArray,
     step: float,
     known: NDArray,
+    doubt: NDArray,
     blocked: NDArray,
 ) -> None:
     """Marks the cells (n1, n2, n3) of the third joint, for each value of the first two, in which what it carries meets the scene.
 
-    Rows that are `known` (n1, n2) to be forbidden are left alone.
+    Rows that are `known` (n1, n2) to be forbidden, and cells that are in no `doubt` (n1, n2, n3), are left alone. Each value of the second
+    joint is a task of its own; the processor's cores share them.
     """
-    n1, n2, n3, k = len(values[0]), len(values[1]), len(turns), len(these.radius)
+    share(lambda mine: _third_ranges(field, hinges, these, values, turns, step, known, doubt, blocked, mine), len(values[1]))
+
+
+@njit(cache=True, nogil=True)
+def _third_ranges(
+    field: Field,
+    hinges: Hinges,
+    these: Circles,
+    values: tuple[NDArray, NDArray],
+    turns: NDArray,
+    step: float,
+    known: NDArray,
+    doubt: NDArray,
+    blocked: NDArray,
+    mine: NDArray,
+) -> None:
+    """The same for some values of the second joint, those with numbers `mine`."""
+    n1, n3, k = len(values[0]), len(turns), len(these.radius)
     local, need, groups = np.empty((k, 9)), np.empty((k, n3)), len(these.first) - 1
     worlds, before, told = np.empty((n1, 4, 4)), np.empty((2, 6)), np.empty(groups, np.bool_)
     for i in range(n1):
         worlds[i] = turned(hinges.T_world_first, hinges.axes[0], values[0][i])
     before[0] = _axis(hinges.T_first_second, hinges.axes[1])
     before[1] = _axis(np.eye(4), hinges.axes[0])
-    for j in range(n2):
+    for j in mine:
         if known[:, j].all():
             continue
-        T = product(turned(hinges.T_first_second, hinges.axes[1], values[1][j]), hinges.T_second_third)
+        T = product(turned(hinges.T_first_second, hinges.axes[1], float(values[1][j])), hinges.T_second_third)
         place(T, these, local)
         needs(local, these, k - groups, k, turns, before, step / 2, need)
         told[:] = False
         for i in range(n1):
             if not known[i, j]:
-                march(field, worlds[i], local, these, turns, before, step, need, told, blocked[i, j])
+                march(field, worlds[i], local, these, turns, before, step, need, told, doubt[i, j], blocked[i, j])

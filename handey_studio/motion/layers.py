@@ -15,7 +15,7 @@ from handey_studio.base import Value
 from handey_studio.motion.configuration_space import ConfigurationSpace, configuration_space, extent_around
 from handey_studio.motion.query import Query
 from handey_studio.motion.regions import Regions, free_regions, region_distances
-from handey_studio.motion.wrist_box import WristBox, wrist_box
+from handey_studio.motion.wrist_box import WristBox
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,6 @@ class Layers(Value):
 
 def layers_of(query: Query, ways: list[NDArray], step: float) -> Layers:
     """A layer for each stretch (m, joints − 3) [rad] of the wrist's way, with cells `step` [rad] wide."""
-    robot = query.world.robot
-    extent = extent_around(robot, step, np.array([query.start, query.goal]))
-    boxes = tuple(wrist_box(robot, way, query.opening, query.held) for way in ways)
-    return Layers(boxes, tuple(configuration_space(query.free, box, extent) for box in boxes))
+    extent = extent_around(query.world.robot, step, np.array([query.start, query.goal]))
+    pairs = [configuration_space(query.free, way, extent) for way in ways]
+    return Layers(tuple(box for _, box in pairs), tuple(space for space, _ in pairs))

@@ -80,30 +80,36 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
     ways = wrist_ways(asked, rng, 2)
     if not ways:
         yield Attempt("wrist", nothing, [], None, "the wrist finds no way to turn that keeps the hand off the arm")
-    plans = [(step, name, stack) for step in asked.options.steps_deg for name, way in ways for stack in _stacks(asked, way, step)]
-    for k, (step, name, (stacked, ways_of_layers)) in enumerate(plans):
+    plans = list(_plans(asked, ways))
+    for k, (needed, stretches, step) in enumerate(plans):
         progress.report(k / (len(plans) + 1), f"configuration space of the arm joints, {step:g}° cells")
-        found = three_legs(asked, layers_of(asked, ways_of_layers, float(np.deg2rad(step))))
-        cells = f"{step:g}° cells" if step != asked.options.steps_deg[0] else ""
-        needed = ", ".join(word for word in (name, stacked, cells) if word)
+        found = three_legs(asked, layers_of(asked, stretches, float(np.deg2rad(step))))
         yield Attempt(needed, found.points, found.movers, found.space, found.reason)
     points, movers, growths = grow_trees(asked, rng, progress)
     why = "" if len(points) else f"random trees did not meet in {growths} growths"
     yield Attempt(f"random trees, {growths} growths", points, movers, None, why)
 
 
-def _stacks(asked: Query, way: NDArray, step: float) -> list[tuple[str, list[NDArray]]]:
-    """The layers for one way of the wrist: the paper's one box; and the wrist as it is at both ends in layers of their own.
+def _plans(asked: Query, ways: list[tuple[str, NDArray]]) -> Iterator[tuple[str, list[NDArray], float]]:
+    """What is needed, the wrist's way by layers, and the cells' width [°], in the order of their cost.
 
-    A held joint that turns far moves the arm itself: a layer for each stretch of its turn. So many layers of fine cells would take longer
-    than random trees do, so they have the widest cells only.
+    The paper's one box; layers for the wrist as it is at both ends, which take in what one box gives; another way of the wrist; finer
+    cells. A held joint that turns far moves the arm itself: a layer for each stretch of its turn. So many layers of fine cells would take
+    longer than random trees do, so they have the widest cells only.
     """
-    robot = asked.world.robot
-    stretches = held_stretches(robot, way)
-    if len(stretches) > 1:
-        name = f"{robot.holding(np.array([asked.start, asked.goal]))} in {len(stretches)} layers"
-        return [(name, [way[:1], *stretches, way[-1:]])] if step == asked.options.steps_deg[0] else []
-    return [("", [way]), ("a layer for each end", [way[:1], way, way[-1:]])]
+    robot, coarse = asked.world.robot, asked.options.steps_deg[0]
+    for step in asked.options.steps_deg:
+        for name, way in ways:
+            stretches, words = held_stretches(robot, way), [name, f"{step:g}° cells" if step != coarse else ""]
+            if len(stretches) > 1 and step != coarse:
+                continue
+            if len(stretches) == 1 and step == coarse and not name:
+                yield "", [way], step
+            layers = "layers for the ends"
+            if len(stretches) > 1:
+                layers = f"{robot.holding(np.array([asked.start, asked.goal]))} in {len(stretches)} layers"
+            words.append(layers)
+            yield ", ".join(word for word in words if word), [way[:1], *stretches, way[-1:]], step
 
 
 def _finished(

@@ -29,7 +29,7 @@ class PathOptions:
     repairs: int = 8
     straight: bool = True
     shortcuts: int = 40
-    tree_growths: int = 1500
+    tree_growths: int = 20_000
 
 
 @dataclass(frozen=True, eq=False)

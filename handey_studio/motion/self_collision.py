@@ -5,10 +5,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.motion.certificate import Mover
+from handey_studio.motion.cores import share
 from handey_studio.world.collision_bodies import Shapes
 from handey_studio.world.collision_queries import Chain, body_distance, forward, placed
 
-FAR_M = 0.3  # distances are told apart up to here
+FAR_M = 0.15  # distances are told apart up to here
 
 
 def self_blocked(mover: Mover, values2: NDArray, values3: NDArray, others: NDArray) -> NDArray:
@@ -25,8 +26,10 @@ def self_blocked(mover: Mover, values2: NDArray, values3: NDArray, others: NDArr
     upper = _some_pairs(shapes, (before > arm[0] + 1) & (before <= arm[2]) & (after > arm[2]))
     lower = _some_pairs(shapes, (before <= arm[0] + 1) & (after > arm[0] + 1))
     balls = _balls(shapes, mover.opening)
-    folded = _ranges(chain, upper, balls, mover.opening, posture, arm, values2[:1], values3, reach)
-    return folded | _ranges(chain, lower, balls, mover.opening, posture, arm, values2, values3, reach)
+    folded, blocked = np.zeros((1, len(values3)), bool), np.zeros((len(values2), len(values3)), bool)
+    _ranges(chain, upper, balls, mover.opening, posture, arm, values2, values3, reach, np.zeros(1, int), folded)
+    share(lambda mine: _ranges(chain, lower, balls, mover.opening, posture, arm, values2, values3, reach, mine, blocked), len(values2))
+    return blocked | folded
 
 
 @njit(cache=True)
@@ -65,7 +68,7 @@ def _reach(shapes: Shapes, poses: NDArray, chain: Chain, joint: int, opening: fl
     return np.sqrt(most)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _ranges(
     chain: Chain,
     shapes: Shapes,
@@ -76,19 +79,19 @@ def _ranges(
     values2: NDArray,
     values3: NDArray,
     reach: float,
-) -> NDArray:
-    """The rows, in strides: what is far apart stays apart while joint 3 turns by a little."""
-    blocked = np.zeros((len(values2), len(values3)), np.bool_)
+    mine: NDArray,
+    blocked: NDArray,
+) -> None:
+    """Marks the forbidden cells of the rows `mine`, in strides: what is far apart stays apart while joint 3 turns by a little."""
     q, step = posture.copy(), values3[1] - values3[0] if len(values3) > 1 else 1.0
     corners = np.empty_like(shapes.corners)
-    for j in range(len(values2)):
+    for j in mine:
         m = 0
         while m < len(values3):
             q[arm[1]], q[arm[2]] = values2[j], values3[m]
             distance = _least(shapes, balls, forward(chain, q), opening, corners)
             blocked[j, m] = distance <= 0.0
             m += 1 + int(distance / (step * reach))
-    return blocked
 
 
 @njit(cache=True)

@@ -12,6 +12,7 @@ from handey_studio.motion.certificate import Mover
 from handey_studio.motion.layers import Layers
 from handey_studio.motion.legs import leg_to_free
 from handey_studio.motion.query import Query
+from handey_studio.motion.regions import nearest_cells, region_distances
 from handey_studio.motion.results import CSpaceSummary
 from handey_studio.motion.search import find_cells
 
@@ -29,12 +30,12 @@ class ThreeLegs:
 def three_legs(query: Query, layers: Layers) -> ThreeLegs:
     """The three legs in a stack of spaces."""
     regions = layers.common_regions(query.start, query.goal, query.options.regions)
-    reason = "" if regions else "no free region holds the wrist as it is at both ends"
+    reason = "" if regions else apart(query, layers)
     for region in regions:
         first = leg_to_free(query.leaving, layers, 0, query.start, region)
         last = leg_to_free(query.arriving, layers, len(layers.spaces) - 1, query.goal, region) if first else None
         if first is None or last is None:
-            reason = reason or f"the {'start' if first is None else 'goal'} does not reach the free cells nearest to it"
+            reason = reason or _unreached(query, layers, region, first is None)
             continue
         between, cells = _free_leg(query, layers, first[1], last[1])
         if not len(between):
@@ -44,6 +45,34 @@ def three_legs(query: Query, layers: Layers) -> ThreeLegs:
         movers = [query.leaving, *[query.free] * (len(between) - 1), query.arriving]
         return ThreeLegs(points, movers, "", summary(layers, cells))
     return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(layers, np.empty((0, 4))))
+
+
+def _unreached(query: Query, layers: Layers, region: int, at_start: bool) -> str:
+    """Why no straight leg joins an end to a region, with the bodies in the way to its nearest cell."""
+    name, q, mover, layer = (
+        ("start", query.start, query.leaving, 0) if at_start else ("goal", query.goal, query.arriving, len(layers.spaces) - 1)
+    )
+    space = layers.spaces[layer]
+    cell = nearest_cells(layers.regions, layer, space.place(q), region, 1)[0]
+    bodies = mover.obstacle(q, space.at(cell, q))
+    between = f": {' and '.join(bodies)} are in the way" if bodies else ""
+    return f"the {name} does not reach the free cells nearest to it{between}"
+
+
+def apart(query: Query, layers: Layers) -> str:
+    """Why no free region is near both ends: what stands between the region nearest to the start and the one nearest to the goal."""
+    last = len(layers.spaces) - 1
+    ends = [(0, query.start), (last, query.goal)]
+    distances = [region_distances(layers.regions, layer, layers.spaces[layer].place(q)) for layer, q in ends]
+    if not layers.regions.count or not all(np.isfinite(least).any() for least in distances):
+        return "no cell is wholly free with the wrist as it is at an end"
+    regions = [int(np.argmin(least)) + 1 for least in distances]
+    space = layers.spaces[last]
+    goal = nearest_cells(layers.regions, last, space.place(query.goal), regions[1], 1)[0]
+    start = nearest_cells(layers.regions, 0, goal, regions[0], 1)[0]
+    bodies = query.free.obstacle(space.at(goal, query.goal), space.at(start, query.goal))
+    between = f": {' and '.join(bodies)} are between them" if bodies else ""
+    return f"start and goal lie in free regions {regions[0]} and {regions[1]} of {layers.regions.count}, which are apart{between}"
 
 
 def _free_leg(query: Query, layers: Layers, first: NDArray, last: NDArray) -> tuple[NDArray, NDArray]:

@@ -78,6 +78,8 @@ def _circles(robot: Robot, stage: int, centres: NDArray, radii: NDArray, slack: 
     """The circles of balls, those near one another together, and of the big balls around them."""
     low, high = centres.min(axis=0), centres.max(axis=0)
     around, around_radii, groups = gather(centres, radii, low, high, GROUP_M)
+    far = np.argsort(-np.linalg.norm(around, axis=1), kind="stable")  # what is far out meets something most often
+    around, around_radii, groups = around[far], around_radii[far], np.argsort(far)[groups]
     order = np.argsort(groups, kind="stable")
     first = np.searchsorted(groups[order], np.arange(len(around) + 1))
     places = np.concatenate([centres[order], around])
