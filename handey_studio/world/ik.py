@@ -87,21 +87,26 @@ def branches(solver: Solver, T_base_flange: NDArray, held_values: NDArray, held_
     return np.concatenate(found)
 
 
-@njit(cache=True)
 def distinct(rows: NDArray) -> NDArray:
     """Configurations (k, n) with angles in (-π, π], those that differ from all before them."""
-    out, count = np.pi - np.mod(np.pi - rows, 2 * np.pi), 0
+    wrapped = np.pi - np.mod(np.pi - rows, 2 * np.pi)
+    kept = np.ones(len(rows), bool)
+    _mark_repeated(wrapped, kept)
+    return wrapped[kept]
+
+
+@njit(cache=True)
+def _mark_repeated(rows: NDArray, kept: NDArray) -> None:
+    """Clears `kept` (k,) for configurations (k, n) that are about the same as one kept before them."""
     for k in range(len(rows)):
-        new = True
-        for before in range(count):
+        for before in range(k):
             gap = 0.0
             for i in range(rows.shape[1]):
-                gap = max(gap, abs(np.mod(out[k, i] - out[before, i] + np.pi, 2 * np.pi) - np.pi))
-            new = new and gap > SAME_BRANCH_RAD
-        if new:
-            out[count] = out[k]
-            count += 1
-    return out[:count]
+                turn = abs(rows[k, i] - rows[before, i])
+                gap = max(gap, min(turn, 2.0 * np.pi - turn))
+            if kept[before] and gap <= SAME_BRANCH_RAD:
+                kept[k] = False
+                break
 
 
 def _six(arm: "Arm", name: str) -> Screws:
