@@ -138,3 +138,12 @@ def test_summary_of_rows():
     assert numbers["a"]["all"]["length_rad"]["median"] == 6.0 and numbers["a"]["all"]["length_together_rad"]["median"] == 4.0
     assert (numbers["a"]["all"]["asked"], numbers["a"]["all"]["no_free_ends"]) == (2, 1)
     assert len(table(numbers)) == 4 and "1 more begin" in table(numbers)[-1] and table({}) == ["no problem was measured"]
+
+
+def test_plot(tmp_path):
+    pytest.importorskip("matplotlib")
+    from handey_studio.task.bench_motion.plot import plot
+
+    found = {"method": "a", "seconds": 1.0, "ends_free": True, "found": True, "length_rad": 2.0, "collisions": []}
+    plot([found, found | {"method": "b", "found": False}, found | {"ends_free": False}], tmp_path / "table.svg")
+    assert (tmp_path / "table.svg").stat().st_size > 5000
