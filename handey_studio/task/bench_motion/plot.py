@@ -13,7 +13,7 @@ from handey_studio.task.bench_motion.summary import Row
 
 
 def plot(rows: Sequence[Row], path: Path) -> None:
-    """Draw rows, but those whose ends are not free, into a PNG, SVG or PDF file. Raises BadInput when matplotlib is missing or the file cannot be written."""
+    """Draw rows, but those whose ends are not free, into a PNG, SVG or PDF file. Raises BadInput without matplotlib or a place to write."""
     check_plot(path)
     import_module("matplotlib").use("Agg")
     pyplot: Any = import_module("matplotlib.pyplot")
