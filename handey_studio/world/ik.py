@@ -36,7 +36,7 @@ def ur(arm: "Arm") -> Solver:
     screws = _six(arm, "ur")
     _parallel(arm, screws, "ur", (2, 3, 4))
     meet, back = _meeting(arm, screws, "ur", (5, 6)), inverse(screws.T_zero)
-    return lambda T, held: from_starts(screws, T, three_parallel(screws, T @ back, meet), SIX, NEAR_ROUNDS)
+    return lambda T, held: _polished(screws, T, *three_parallel(screws, T @ back, meet))
 
 
 def wrist(arm: "Arm") -> Solver:
@@ -44,7 +44,11 @@ def wrist(arm: "Arm") -> Solver:
     screws = _six(arm, "spherical_wrist")
     _parallel(arm, screws, "spherical_wrist", (2, 3))
     meet, back = _meeting(arm, screws, "spherical_wrist", (4, 5, 6)), inverse(screws.T_zero)
-    return lambda T, held: from_starts(screws, T, spherical_wrist(screws, T @ back, meet), SIX, NEAR_ROUNDS)
+    return lambda T, held: _polished(screws, T, *spherical_wrist(screws, T @ back, meet))
+
+
+def _polished(screws: Screws, T: NDArray, rows: NDArray, count: int) -> NDArray:
+    return from_starts(screws, T, rows[:count], SIX, NEAR_ROUNDS)
 
 
 def seven(arm: "Arm") -> Solver:

@@ -16,15 +16,15 @@ ALIGNED = 1e-7  # axes this near to parallel leave their share of the turn undet
 
 
 @njit(cache=True)
-def three_parallel(screws: Screws, G: NDArray, meet: Vector) -> NDArray:
-    """Branches (k, 6) [rad] where axes 1, 2 and 3 are parallel and 4 and 5 meet in `meet` [m], as in Universal Robots' arms."""
+def three_parallel(screws: Screws, G: NDArray, meet: Vector) -> tuple[NDArray, int]:
+    """Branches (8, 6) [rad], and how many they are. Axes 1, 2 and 3 are parallel, 4 and 5 meet in `meet` [m]: Universal Robots' arms."""
     out, count = np.empty((8, 6)), 0
     w0, w1, w2 = row(screws.directions, 0), row(screws.directions, 1), row(screws.directions, 2)
     w3, w4, w5 = row(screws.directions, 3), row(screws.directions, 4), row(screws.directions, 5)
     p0, p1, p2, p3 = row(screws.points, 0), row(screws.points, 1), row(screws.points, 2), row(screws.points, 3)
     there, q0a, q0b = angles_to_plane(w1, times(-1.0, w0), minus(placed_by(G, meet), p0), dot(w1, minus(meet, p0)))
     if not there:
-        return out[:0]
+        return out, 0
     for q0 in (q0a, q0b):
         there, q4a, q4b = angles_to_plane(w1, w4, w5, dot(w1, swung(screws, 0, -q0, turned_by(G, w5))))
         if not there:
@@ -47,7 +47,7 @@ def three_parallel(screws: Screws, G: NDArray, meet: Vector) -> NDArray:
                 out[count, 0], out[count, 1], out[count, 2] = q0, q1, q2
                 out[count, 3], out[count, 4], out[count, 5] = (total - q1 - q2 * dot(w1, w2)) * dot(w1, w3), q4, q5
                 count += 1
-    return out[:count]
+    return out, count
 
 
 @njit(cache=True)
@@ -62,8 +62,8 @@ def _comfortable(screws: Screws, G: NDArray, q0: float, q4: float) -> float:
 
 
 @njit(cache=True)
-def spherical_wrist(screws: Screws, G: NDArray, meet: Vector) -> NDArray:
-    """Branches (k, 6) [rad] where axes 1 and 2 are parallel and 3, 4 and 5 meet in `meet` [m], as in the Puma."""
+def spherical_wrist(screws: Screws, G: NDArray, meet: Vector) -> tuple[NDArray, int]:
+    """Branches (8, 6) [rad], and how many they are, where axes 1 and 2 are parallel and 3, 4 and 5 meet in `meet` [m], as in the Puma."""
     out, count = np.empty((8, 6)), 0
     w0, w1, w2 = row(screws.directions, 0), row(screws.directions, 1), row(screws.directions, 2)
     w3, w4, w5 = row(screws.directions, 3), row(screws.directions, 4), row(screws.directions, 5)
@@ -71,7 +71,7 @@ def spherical_wrist(screws: Screws, G: NDArray, meet: Vector) -> NDArray:
     wrist = placed_by(G, meet)
     there, q0a, q0b = angles_to_plane(w1, times(-1.0, w0), minus(wrist, p0), dot(w1, minus(meet, p0)))
     if not there:
-        return out[:0]
+        return out, 0
     for q0 in (q0a, q0b):
         lifted = minus(screwed(screws, 0, -q0, wrist), p1)
         there, q2a, q2b = angles_to_distance(w2, minus(meet, p2), minus(p1, p2), length(lifted))
@@ -90,4 +90,4 @@ def spherical_wrist(screws: Screws, G: NDArray, meet: Vector) -> NDArray:
                 out[count, 0], out[count, 1], out[count, 2] = q0, q1, q2
                 out[count, 3], out[count, 4], out[count, 5] = q3, q4, q5
                 count += 1
-    return out[:count]
+    return out, count

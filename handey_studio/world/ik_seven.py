@@ -33,7 +33,8 @@ def held_third(screws: Screws, T: NDArray, G: NDArray, shoulder: Vector, wrist: 
     coefficients = min(trials, key=lambda trial: trial[1])[0]
     roots = np.roots(coefficients)
     angles = np.angle(roots[np.abs(np.log(np.abs(roots) + 1e-300)) < REAL])
-    return from_starts(screws, T, _postures(screws, G, shoulder, wrist, held, angles), FREE, rounds)
+    seeds, count = _postures(screws, G, shoulder, wrist, held, angles)
+    return from_starts(screws, T, seeds[:count], FREE, rounds)
 
 
 def _coefficients(screws: Screws, G: NDArray, shoulder: Vector, wrist: Vector, held: float, shift: float) -> tuple[NDArray, float]:
@@ -92,8 +93,8 @@ def _both(screws: Screws, held: float, reach: Vector, aim: Vector, before: Vecto
 
 
 @njit(cache=True)
-def _postures(screws: Screws, G: NDArray, shoulder: Vector, wrist: Vector, held: float, angles: NDArray) -> NDArray:
-    """The configurations (k, 7) with joint 6 at one of the angles (m,) that hold joint 2 about where it is held."""
+def _postures(screws: Screws, G: NDArray, shoulder: Vector, wrist: Vector, held: float, angles: NDArray) -> tuple[NDArray, int]:
+    """The configurations (m, 7), how many they are: joint 6 at one of the angles (m,), joint 2 about where it is held."""
     out, count = np.empty((4 * len(angles), 7)), 0
     for q6 in angles:
         for branch in range(4):
@@ -101,7 +102,7 @@ def _postures(screws: Screws, G: NDArray, shoulder: Vector, wrist: Vector, held:
             if abs(off) < NEAR:
                 out[count] = _posture(screws, G, shoulder, wrist, held, q6, q3, to, pointing)
                 count += 1
-    return out[:count]
+    return out, count
 
 
 @njit(cache=True)
