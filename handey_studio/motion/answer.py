@@ -54,6 +54,7 @@ def path_report(answer: PathAnswer) -> dict[str, Any]:
         "robot": answer.robot.name,
         "status": result.status,
         "reason": result.reason,
+        "proven": result.proven,
         "needed": result.needed,
         "joint_names": list(answer.robot.joint_names),
         "time_s": trajectory.time_s.tolist() if trajectory else [],

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Silent
+from handey_studio.motion.apart import surely_apart
 from handey_studio.motion.certificate import Mover
 from handey_studio.motion.layers import layers_of
 from handey_studio.motion.query import PathOptions, Query, certify_runs, query
@@ -19,6 +20,7 @@ from handey_studio.world import Held, World
 from handey_studio.world.collision import Pairs
 
 STAGE = "path"
+FEW_GROWTHS = 2000  # of the random trees, before it is asked whether there can be a path at all
 
 
 class Attempt(NamedTuple):
@@ -29,6 +31,7 @@ class Attempt(NamedTuple):
     movers: list[Mover]
     space: CSpaceSummary | None
     reason: str
+    proven: bool = False
 
 
 def plan_path(
@@ -66,6 +69,8 @@ def plan_path(
             result = _finished(asked, attempt, space, ledger, entry, rng)
             if result is not None:
                 return result
+        if attempt.proven:
+            return PathResult("none", attempt.reason, np.empty((0, len(asked.start))), entries=ledger.entries, space=space, proven=True)
         if progress.cancelled:
             return PathResult("none", "cancelled", np.empty((0, len(asked.start))), entries=ledger.entries, space=space, cancelled=True)
     reasons = dict.fromkeys(entry.reason for entry in ledger.entries if entry.reason)
@@ -85,9 +90,15 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
         progress.report(k / (len(plans) + 1), f"configuration space of the arm joints, {step:g}° cells")
         found = three_legs(asked, layers_of(asked, stretches, float(np.deg2rad(step))))
         yield Attempt(needed, found.points, found.movers, found.space, found.reason)
-    points, movers, growths = grow_trees(asked, rng, progress)
-    why = "" if len(points) else f"random trees did not meet in {growths} growths"
-    yield Attempt(f"random trees, {growths} growths", points, movers, None, why)
+    few = min(FEW_GROWTHS, asked.options.tree_growths)
+    for most in dict.fromkeys((few, asked.options.tree_growths)):
+        points, movers, grown = grow_trees(asked, most, rng, progress)
+        why = "" if len(points) else f"random trees did not meet in {grown} growths"
+        yield Attempt(f"random trees, {grown} growths", points, movers, None, why)
+        if most == few and not len(points) and surely_apart(asked):
+            why = "start and goal stay apart even where only what is wholly blocked is taken out"
+            yield Attempt("proof", nothing, [], None, why, proven=True)
+            return
 
 
 def _plans(asked: Query, ways: list[tuple[str, NDArray]]) -> Iterator[tuple[str, list[NDArray], float]]:

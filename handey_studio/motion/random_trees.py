@@ -39,9 +39,10 @@ class Tree(NamedTuple):
     free: Speaker
 
 
-def grow_trees(query: Query, rng: np.random.Generator, progress: Progress) -> tuple[NDArray, list[Mover], int]:
-    """Points (n, joints) of a path and the mover of each segment, both empty when the trees did not meet; and how often they grew."""
-    most = query.options.tree_growths
+def grow_trees(query: Query, most: int, rng: np.random.Generator, progress: Progress) -> tuple[NDArray, list[Mover], int]:
+    """Points (n, joints) of a path and the mover of each segment, both empty when the trees did not meet in `most`
+    growths; and how often they grew.
+    """
     trees = (_tree(query.start, query.leaving, query.free, most), _tree(query.goal, query.arriving, query.free, most))
     lower, upper = _bounds(query)
     for growth in range(0, most, AT_ONCE):

@@ -73,7 +73,8 @@ class PathResult(Value):
     """A certified path, or why there is none.
 
     `q_rad` (n, joints) [rad], joint-linear between its points; empty (0, joints) when there is none. `legs` name its stretches, `needed`
-    says what beyond the paper's three legs was needed, empty when nothing was. `entries` are the ledger's.
+    says what beyond the paper's three legs was needed, empty when nothing was. `entries` are the ledger's. `proven`: there is no path at
+    all, for start and goal stay apart even where only what is wholly blocked is taken out.
     """
 
     status: Literal["found", "none"]
@@ -85,6 +86,7 @@ class PathResult(Value):
     entries: tuple[Entry, ...] = ()
     space: CSpaceSummary | None = None
     cancelled: bool = False
+    proven: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "q_rad", frozen_array(self.q_rad))

@@ -64,8 +64,9 @@ def apart(query: Query, layers: Layers) -> str:
     last = len(layers.spaces) - 1
     ends = [(0, query.start), (last, query.goal)]
     distances = [region_distances(layers.regions, layer, layers.spaces[layer].place(q)) for layer, q in ends]
-    if not layers.regions.count or not all(np.isfinite(least).any() for least in distances):
-        return "no cell is wholly free with the wrist as it is at an end"
+    for (_, q), least, name in zip(ends, distances, ("start", "goal"), strict=True):
+        if not np.isfinite(least).any():
+            return f"no cell is wholly free with the wrist as it is at the {name}, where {query.free.clearance(q)}"
     regions = [int(np.argmin(least)) + 1 for least in distances]
     space = layers.spaces[last]
     goal = nearest_cells(layers.regions, last, space.place(query.goal), regions[1], 1)[0]
