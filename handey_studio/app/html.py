@@ -71,6 +71,15 @@ def count_row(label: str, count: int, most: int, colour: palette.RGB) -> str:
     )
 
 
+def scale(title: str, stops: str, ticks: Iterable[str]) -> str:
+    """A bar of colours (CSS gradient stops) with numbers below it."""
+    numbers = "".join(f"<span>{esc(tick)}</span>" for tick in ticks)
+    return (
+        f'<div style="margin:4px 14px 8px;font-size:12px">{esc(title)}<div style="height:10px;border-radius:3px;margin-top:3px;'
+        f'background:linear-gradient(90deg,{stops})"></div><div style="display:flex;justify-content:space-between">{numbers}</div></div>'
+    )
+
+
 def hidden(elements: Iterable[str]) -> str:
     """Takes buttons (elements' ids) off the page that only rows of a list press."""
     rules = ", ".join(f'div:has(> [id="{esc(element)}"])' for element in elements if element)

@@ -64,6 +64,10 @@ ELEVATION_AT = np.array([0.0, 0.04, 0.10, 0.30, 0.48, 0.66, 0.84, 1.0])
 RESIDUAL = np.array([[33, 84, 172], [120, 166, 214], [247, 247, 247], [236, 138, 116], [178, 20, 43]], dtype=float)
 RESIDUAL_AT = np.linspace(-1.0, 1.0, len(RESIDUAL))
 
+# Clearance: from vermillion where bodies all but touch over pale yellow to blue where there is room.
+CLEARANCE = np.array([[204, 76, 24], [236, 142, 32], [250, 226, 150], [120, 166, 214], [33, 84, 172]], dtype=float)
+CLEARANCE_AT = np.array([0.0, 0.04, 0.16, 0.5, 1.0])
+
 
 def css(colour: Sequence[float]) -> str:
     """`#rrggbb`."""
@@ -78,6 +82,11 @@ def elevation_colours(share: NDArray) -> NDArray:
 def residual_colours(share: NDArray) -> NDArray:
     """Colours (n, 3) uint8 for residuals (n,) as shares of their limit, in [-1, 1]; beyond it the colour stays."""
     return _between(share, RESIDUAL_AT, RESIDUAL)
+
+
+def clearance_colours(share: NDArray) -> NDArray:
+    """Colours (n, 3) uint8 for clearances (n,) as shares of the greatest that is told, in [0, 1]."""
+    return _between(share, CLEARANCE_AT, CLEARANCE)
 
 
 def _between(share: NDArray, at: NDArray, colours: NDArray) -> NDArray:

@@ -32,6 +32,7 @@ VIEW_KEYS: tuple[tuple[Any, str], ...] = (
     ("4", "Grasp"),
     ("5", "Hand"),
     ("6", "Hypothesis"),
+    ("7", "C-space"),
 )
 
 

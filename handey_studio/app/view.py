@@ -13,6 +13,7 @@ from handey_studio.app.panels.move import MovePanel
 from handey_studio.app.panels.sensing import SensingPanel
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.panels.timeline import TimelinePanel
+from handey_studio.app.scene.cspace import CSpaceScene
 from handey_studio.app.scene.depth import DepthScene
 from handey_studio.app.scene.destination import DestinationScene
 from handey_studio.app.scene.findings import PlanScene
@@ -23,6 +24,7 @@ from handey_studio.app.scene.pile import PileScene
 from handey_studio.app.scene.robot import RobotScene
 from handey_studio.app.scene.sensing import SensingScene
 from handey_studio.app.scene.workcell import WorkcellScene
+from handey_studio.app.scene.wrist_box import WristBoxScene
 from handey_studio.app.shortcuts import add_shortcuts
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send
@@ -44,7 +46,7 @@ class View:
         server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
         scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server, send)]
         scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), HypothesisScene(server)]
-        scenes += [PairScene(server), PlanScene(server)]
+        scenes += [PairScene(server), PlanScene(server), CSpaceScene(server), WristBoxScene(server)]
         session = SessionPanel(server, send)
         self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()

@@ -120,5 +120,7 @@ def _check_plan(path: str, plan: MovePlan) -> None:
         shapes = (step.time_s.shape, step.q_rad.shape, step.hand_opening_m.shape)
         if n == 0 or shapes != ((n,), (n, len(step.joint_names)), (n,)):
             raise BadInput(f"{path}.steps[{number}] has times, joints and openings of shapes {shapes}; each needs one row a time.")
+        if step.clearance_m.shape not in ((n,), (0,)):
+            raise BadInput(f"{path}.steps[{number}] has clearances of shape {step.clearance_m.shape}; it needs one a time, {n}.")
         if (np.diff(step.time_s) < 0).any():
             raise BadInput(f"{path}.steps[{number}] has times that run backwards.")

@@ -75,6 +75,12 @@ class Replay(Value):
         q = np.array([self.at(t).q_rad for t in np.linspace(0.0, self.duration, samples)])
         return arm_of(self.robot).hand_pose(q)[:, :3, 3]
 
+    def clearance(self, time_s: float) -> float | None:
+        """How far [m] whatever may not touch is apart at a time [s]; None in plans that did not keep it."""
+        number = self.step_at(time_s)
+        step = self.plan.steps[number]
+        return float(np.interp(time_s - self.starts[number], step.time_s, step.clearance_m)) if len(step.clearance_m) else None
+
     def _part_pose(self, number: int, q: NDArray) -> NDArray:
         """T_world_part: in the hand while a step holds it, before that where it was found, after that where it was left."""
         step = self.plan.steps[number]

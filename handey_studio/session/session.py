@@ -23,6 +23,9 @@ LAYERS = (
     "residuals",
     "grasp",
     "hand path",
+    "clearance",
+    "configuration space",
+    "wrist box",
     "destination",
     "labels",
 )

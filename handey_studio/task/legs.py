@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Value, frozen_array
-from handey_studio.motion import Certificate, PathOptions, PathResult, certify, plan_path, straight_path, time_path
+from handey_studio.motion import Certificate, PathOptions, PathResult, Trajectory, certify, plan_path, straight_path, time_path
 from handey_studio.task.grasp_search import CLOSED_MARGIN_M, Grasp, finger_pairs, reachable
 from handey_studio.task.options import Pairs
 from handey_studio.task.plan import MovePlan, Step, StepKind
@@ -15,6 +15,7 @@ from handey_studio.world.collision import collision_model
 
 HEIGHTS_M = (0.06, 0.10, 0.14, 0.18)  # straight up from where the part stands: the first at which nothing is near any more
 CLEAR_M = 0.003
+TOLD_M = 0.05  # farther apart than this nobody needs to know how far
 STRAIGHT_STEP_M = 0.005
 FINGER_SPEED_M_S = 0.05
 MAX_PAIRS = 6  # IK branches at pickup × putdown that are tried for one grasp
@@ -118,7 +119,9 @@ def _carry(
         progress.report(0.5, f"planning the arm's motion: {what}")
         found = plan_path(world, a, b, opening, carried, options=PathOptions(straight=what != "transfer"), rng=rng, progress=progress)
         holding = world.robot.holding(np.array([a, b]))
-        entry = ledger.add("arm motion", f"{what}, {holding}" if holding else what, None if found.found else found.reason, parent=grasp.entry)
+        entry = ledger.add(
+            "arm motion", f"{what}, {holding}" if holding else what, None if found.found else found.reason, parent=grasp.entry
+        )
         ledger.adopt(found.entries, parent=entry)
         return found if found.found else None
 
@@ -174,19 +177,34 @@ def _steps(
         else certify(world, np.repeat(q, 2, axis=0), np.array(openings), None, pairs, CLOSED_MARGIN_M)
         for k, (_, world, q, openings, _, pairs) in enumerate(rows)
     ]
-    return tuple(_step(goal.at_start, *row) for row in rows), worst(certificates)
+    return tuple(_step(*row) for row in rows), worst(certificates)
 
 
-def _step(world: World, kind: StepKind, _: World, q: NDArray, openings: tuple[float, float], held: Held | None, pairs: Pairs) -> Step:
+def _step(kind: StepKind, world: World, q: NDArray, openings: tuple[float, float], held: Held | None, pairs: Pairs) -> Step:
     """One timed step; a single configuration means that only the fingers move."""
-    names = world.robot.joint_names
-    T_hand_part = held.T_hand_part if held else None
-    name = held.name if held else None
     if len(q) == 1:
         seconds = max(abs(openings[1] - openings[0]) / FINGER_SPEED_M_S, 0.1)
-        return Step(kind, names, np.array([0.0, seconds]), np.repeat(q, 2, axis=0), np.array(openings), name, T_hand_part, pairs)
-    timed = time_path(world.robot, q, np.full(len(q), openings[0]))
-    return Step(kind, names, timed.time_s, timed.q_rad, timed.hand_opening_m, name, T_hand_part, pairs)
+        timed = Trajectory(np.array([0.0, seconds]), np.repeat(q, 2, axis=0), np.array(openings))
+    else:
+        timed = time_path(world.robot, q, np.full(len(q), openings[0]))
+    return Step(
+        kind,
+        world.robot.joint_names,
+        timed.time_s,
+        timed.q_rad,
+        timed.hand_opening_m,
+        held.name if held else None,
+        held.T_hand_part if held else None,
+        pairs,
+        _clearances(world, timed, held, pairs),
+    )
+
+
+def _clearances(world: World, timed: Trajectory, held: Held | None, pairs: Pairs) -> NDArray:
+    """Least distance (n,) [m] at each time between whatever may not touch, at most `TOLD_M`."""
+    model = collision_model(world)
+    at = zip(timed.q_rad, timed.hand_opening_m, strict=True)
+    return np.array([min(model.clearance(q, float(opening), held, pairs, limit=TOLD_M).distance, TOLD_M) for q, opening in at])
 
 
 def worst(certificates: list[Certificate]) -> Certificate:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Entry, Value, frozen_array
@@ -25,7 +26,8 @@ class MoveCommand:
 class Step(Value):
     """One step of a plan: a timed joint path with the hand's opening, what it holds, and the pairs that may touch.
 
-    `q_rad` (n, joints), `time_s` (n,) from zero, `hand_opening_m` (n,). `T_hand_part` (4, 4) when something is held.
+    `q_rad` (n, joints), `time_s` (n,) from zero, `hand_opening_m` (n,). `T_hand_part` (4, 4) when something is held. `clearance_m` (n,) how
+    far whatever may not touch is apart at each time, beyond 50 mm not told apart; empty in plans of earlier versions.
     """
 
     kind: StepKind
@@ -36,9 +38,10 @@ class Step(Value):
     held: str | None
     T_hand_part: NDArray | None
     allowed_contacts: tuple[tuple[str, str], ...]
+    clearance_m: NDArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        for key in ("time_s", "q_rad", "hand_opening_m"):
+        for key in ("time_s", "q_rad", "hand_opening_m", "clearance_m"):
             object.__setattr__(self, key, frozen_array(getattr(self, key)))
         if self.T_hand_part is not None:
             object.__setattr__(self, "T_hand_part", frozen_array(self.T_hand_part))

@@ -63,6 +63,7 @@ def _step(step: Step, robot: Robot) -> dict[str, Any]:
         "q_rad": plain(step.q_rad),
         "held_joints": {robot.joint_names[k]: plain(step.q_rad[[0, -1], k]) for k in robot.held_index},
         "hand_opening_m": plain(step.hand_opening_m),
+        "clearance_m": plain(step.clearance_m),
         "held": step.held,
         "T_hand_part": plain(step.T_hand_part),
         "allowed_contacts": [list(pair) for pair in step.allowed_contacts],

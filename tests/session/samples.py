@@ -84,7 +84,8 @@ def line(robot: Robot, kind, start, end, opening, T_hand_part=None, held=None) -
     """A step of two seconds in 21 samples."""
     s = np.linspace(0.0, 1.0, 21)
     q = start + s[:, None] * (np.asarray(end) - start)
-    return Step(kind, robot.joint_names, 2.0 * s, q, opening[0] + s * (opening[1] - opening[0]), held, T_hand_part, ())
+    openings, clearances = opening[0] + s * (opening[1] - opening[0]), np.full_like(s, 0.02)
+    return Step(kind, robot.joint_names, 2.0 * s, q, openings, held, T_hand_part, (), clearances)
 
 
 def ledger():

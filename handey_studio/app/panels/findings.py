@@ -3,12 +3,13 @@
 import numpy as np
 import viser
 
-from handey_studio.app import html
+from handey_studio.app import html, palette
 from handey_studio.app.cspace import slice_html
 from handey_studio.app.state import State
 from handey_studio.app.svg import grasp_plane_html
 from handey_studio.app.wire import set_to
 from handey_studio.geometry.transforms import pose_difference
+from handey_studio.task.legs import TOLD_M
 from handey_studio.task.plan import MovePlan, MoveResult
 
 NO_RESULT = "No MOVE was tried yet. Set the part and its destination on the left, then press Plan or MOVE."
@@ -58,7 +59,21 @@ class PathPanel:
         elif old is None or old.session.result is not new.session.result or old.session.view.time_s != new.session.view.time_s:
             space, moment = replay.plan.space, replay.at(new.session.view.time_s)
             picture = slice_html(space, moment.q_rad) if space is not None else html.empty(NO_SPACE)
-            self._pane.content = html.facts(path_facts(replay.plan), "path") + picture
+            now = html.facts([("Clearance now", clearance_words(replay.clearance(moment.time_s)))], "clearance-now")
+            self._pane.content = html.facts(path_facts(replay.plan), "path") + now + clearance_legend() + picture
+
+
+def clearance_words(clearance: float | None) -> str:
+    """How near anything comes to anything that it may not touch."""
+    if clearance is None:
+        return "this plan did not keep it"
+    return f"over {html.millimetres(TOLD_M)}" if clearance >= TOLD_M else html.millimetres(clearance, 1)
+
+
+def clearance_legend() -> str:
+    """The scale of the beads along the hand's path."""
+    stops = ", ".join(f"{palette.css(c)} {100 * at:.0f}%" for c, at in zip(palette.CLEARANCE, palette.CLEARANCE_AT, strict=True))
+    return html.scale("Clearance along the path (mm)", stops, [f"{1e3 * TOLD_M * share:.0f}" for share in (0.0, 0.5, 1.0)])
 
 
 def approach_point(state: State) -> int:

@@ -11,7 +11,7 @@ from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
 from handey_studio.session import LAYERS
 
-VIEWS = (("View", ("Workcell", "Pile", "Top")), ("Close-up", ("Grasp", "Hand")))
+VIEWS = (("View", ("Workcell", "Pile", "Top")), ("Close-up", ("Grasp", "Hand", "C-space")))
 
 
 class LookingPanel:

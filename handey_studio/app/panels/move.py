@@ -19,8 +19,8 @@ from handey_studio.task.destination import format_pose
 NO_PART = "–"
 KEYS = (
     '<div style="margin:14px 14px 6px;font-size:11.5px;line-height:1.6;color:#8a94a0">Space plays, J and L go by steps, 1 to 5 look from '
-    "elsewhere, P plans, M moves; N and B look at the next hypothesis and the one before, 6 from close up. Ctrl+K lists every command. "
-    "Click a located part to choose it, a data edge or a hypothesis to read about it.</div>"
+    "elsewhere, P plans, M moves; N and B look at the next hypothesis and the one before, 6 from close up; 7 looks at the configuration "
+    "space. Ctrl+K lists every command. Click a located part to choose it, a data edge or a hypothesis to read about it.</div>"
 )
 
 

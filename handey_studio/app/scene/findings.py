@@ -8,9 +8,10 @@ from handey_studio.app import palette
 from handey_studio.app.scene.units import place, scaled
 from handey_studio.app.state import State
 from handey_studio.session import Replay
+from handey_studio.task.legs import TOLD_M
 from handey_studio.task.plan import GraspChoice
 
-PATH, GRASP = "/plan/hand_path", "/plan/grasp"
+PATH, GRASP, BEADS = "/plan/hand_path", "/plan/grasp", "/plan/clearance"
 SAMPLES = 240
 
 
@@ -22,6 +23,7 @@ class PlanScene:
         self._root: viser.FrameHandle | None = None
         self._grasp: viser.FrameHandle | None = None
         self._path: viser.SceneNodeHandle | None = None
+        self._beads: viser.SceneNodeHandle | None = None
 
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
@@ -33,7 +35,7 @@ class PlanScene:
     def _build(self, state: State) -> None:
         scene = self._server.scene
         scene.remove_by_name("/plan")
-        self._path = self._grasp = None
+        self._path = self._grasp = self._beads = None
         replay = state.replay
         if replay is None:
             return
@@ -41,6 +43,11 @@ class PlanScene:
         points, colours = coloured_path(replay)
         self._path = scene.add_line_segments(PATH, scaled(points), colors=colours, thickness=3.0, thickness_units="screen")
         self._grasp = add_grasp(scene, replay.plan.grasp)
+        beads = clearance_beads(replay)
+        if beads is not None:
+            self._beads = scene.add_point_cloud(
+                BEADS, scaled(beads[0]), beads[1], point_size=0.06, point_shape="circle", precision="float32"
+            )
 
     def _show(self, state: State) -> None:
         """The grasp stays on the part wherever the timeline has it."""
@@ -48,7 +55,7 @@ class PlanScene:
         if self._grasp is not None and replay is not None:
             place(self._grasp, replay.at(state.session.view.time_s).T_world_part)
         hidden = state.session.view.hidden_layers
-        for handle, layer in ((self._path, "hand path"), (self._grasp, "grasp")):
+        for handle, layer in ((self._path, "hand path"), (self._grasp, "grasp"), (self._beads, "clearance")):
             if handle is not None and handle.visible != (layer not in hidden):
                 handle.visible = layer not in hidden
 
@@ -60,6 +67,15 @@ def coloured_path(replay: Replay) -> tuple[NDArray, NDArray]:
     kinds = [replay.plan.steps[replay.step_at(t)].kind for t in times[:-1]]
     colours = np.array([palette.STEP_COLOURS[kind] for kind in kinds], dtype=np.uint8)
     return np.stack([points[:-1], points[1:]], axis=1), np.repeat(colours[:, None], 2, axis=1)
+
+
+def clearance_beads(replay: Replay) -> tuple[NDArray, NDArray] | None:
+    """Points (n, 3) [m] along the fingertips' path and their colours (n, 3) by how near anything comes to the arm while it is there."""
+    times = np.linspace(0.0, replay.duration, SAMPLES)
+    told = [replay.clearance(t) for t in times]
+    if None in told:
+        return None
+    return replay.hand_path(SAMPLES), palette.clearance_colours(np.array(told, dtype=float) / TOLD_M)
 
 
 def add_grasp(scene: viser.SceneApi, grasp: GraspChoice) -> viser.FrameHandle:

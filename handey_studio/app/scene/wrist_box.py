@@ -1,0 +1,45 @@
+"""The wrist box around the real wrist: what the configuration space was computed with (Handey 1987 §4)."""
+
+import numpy as np
+import viser
+
+from handey_studio.app import palette
+from handey_studio.app.scene.units import scaled
+from handey_studio.app.state import State
+
+LAYER = "wrist box"
+NAME = "/robot/link{link}/wrist_box"  # it goes with the link that carries the wrist
+TOUCHING = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]  # corners that a side joins
+
+
+class WristBoxScene:
+    """Shown while the arm carries the part across: the box is of that motion."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._lines: viser.LineSegmentsHandle | None = None
+
+    def render(self, old: State | None, new: State) -> None:
+        if old is None or old.session.result is not new.session.result or old.robot != new.robot:
+            self._build(new)
+        if self._lines is not None and self._lines.visible != _shown(new):
+            self._lines.visible = _shown(new)
+
+    def _build(self, state: State) -> None:
+        if self._lines is not None:
+            self._lines.remove()
+        self._lines, replay = None, state.replay
+        if replay is None or replay.plan.space is None:
+            return
+        space = replay.plan.space
+        sides = np.array([(space.wrist_box[a], space.wrist_box[b]) for a, b in TOUCHING])
+        self._lines = self._server.scene.add_line_segments(
+            NAME.format(link=space.wrist_box_link), scaled(sides), colors=palette.BLUE, thickness=2.0, thickness_units="screen"
+        )
+
+
+def _shown(state: State) -> bool:
+    replay = state.replay
+    if replay is None or LAYER in state.session.view.hidden_layers:
+        return False
+    return replay.plan.steps[replay.step_at(state.session.view.time_s)].kind == "transfer"
