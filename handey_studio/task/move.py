@@ -125,8 +125,8 @@ def _why_none(entries: tuple[Entry, ...]) -> str:
     said = "; ".join(f"{count} × {reason}" for reason, count in counts.most_common(3))
     text = f"none of {len(groups)} grasp groups works: {said}"
     pickup_only = sum(count for reason, count in counts.items() if reason and "putdown" in reason)
-    if pickup_only and not any(reason and reason.startswith("no arm motion") for reason in counts):
-        text += f"; {pickup_only} are free at the pickup but not at the putdown: this MOVE needs a regrasp, which is not built yet"
+    if pickup_only:
+        text += f"; {pickup_only} are free at the pickup but not at the putdown: a regrasp might help, which is not built yet"
     return text
 
 
