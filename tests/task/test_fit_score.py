@@ -93,7 +93,7 @@ def test_labels_tell_right_wrong_and_what_teaches_nothing():
     turn[:3, 3] = middle - turn[:3, :3] @ middle  # half a turn about its own middle
     assert is_right(HERE @ from_xyz_rpy((0.003, 0.0, 0.0), (0.02, 0.0, 0.0)), part, truth) is True
     assert is_right(HERE @ transform(None, (0.009, 0.0, 0.0)), part, truth) is None, "nearly"
-    assert is_right(HERE @ turn, part, truth) is None, "a rival of the true pose"
+    assert is_right(HERE @ turn, part, truth) is False, "a look-alike in the same place"
     assert is_right(HERE @ transform(None, (0.3, 0.0, 0.0)), part, truth) is False
     assert is_right(HERE, part, []) is False, "an absent part"
 

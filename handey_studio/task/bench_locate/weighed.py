@@ -20,7 +20,6 @@ from handey_studio.world.library import Library
 from handey_studio.world.part import Part
 
 NEAR_MM, NEAR_DEG = 12.0, 15.0  # a pose this near that is not right is on its way there: it teaches nothing
-BESIDE_SHARE = 0.4  # of a part's diameter: a wrong pose nearer to a true one of its kind than this is its rival, and falls to it
 
 
 class Weighed(NamedTuple):
@@ -60,12 +59,10 @@ def _of_scene(scene: SimulatedScene, parts: Iterable[Part]) -> list[tuple[NDArra
 
 def is_right(T_world_part: NDArray, part: Part, truth: Iterable[TruePose]) -> bool | None:
     """Whether a pose (4, 4) of a part is that of one of its true instances, within the judge's limits; None where that teaches nothing."""
-    middle, teaches = part.solid.volume_and_centroid[1], True
+    teaches = True
     for true in truth:
         mm, degrees = pose_error(T_world_part, true.T_world_part, part.symmetries)
         if mm <= RIGHT_MM and degrees <= RIGHT_DEG:
             return True
-        apart = (T_world_part - true.T_world_part)[:3] @ [*middle, 1.0]
-        near = mm <= NEAR_MM and degrees <= NEAR_DEG
-        teaches &= not near and bool(np.linalg.norm(apart) > BESIDE_SHARE * part.solid.diameter)
+        teaches &= mm > NEAR_MM or degrees > NEAR_DEG
     return False if teaches else None
