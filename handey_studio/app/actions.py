@@ -8,8 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.app.commands import Command
+from handey_studio.app.commands import Command, ShowLayer
 from handey_studio.app.jobs import JobStarted
+from handey_studio.app.scene.cspace import LAYER as CSPACE
 from handey_studio.app.scene.cspace import MIDDLE_M
 from handey_studio.app.state import State, opened
 from handey_studio.base import BadInput
@@ -163,7 +164,7 @@ class LookFrom:
     def run(self, bench: Bench) -> State:
         position, look_at = viewpoint(self.view, bench.state)
         bench.look(position, look_at, self.client)
-        return bench.state
+        return ShowLayer(CSPACE, True).apply(bench.state) if self.view == "C-space" else bench.state
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class ViewState(Value):
     hypothesis: int = -1
     edge: int = -1
     result: int = -1
-    hidden_layers: tuple[str, ...] = ()
+    hidden_layers: tuple[str, ...] = ("configuration space",)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "camera_position", frozen_array(self.camera_position))

@@ -256,3 +256,9 @@ def test_cells_of_points_are_those_of_the_map(full):
     np.testing.assert_array_equal(cells_of(scan, points), np.isfinite(scan.elevation))
     outside = transform(translation=(1.0, 0.0, 0.0))[:3, 3] + points[:1]
     assert not cells_of(scan, outside).any()
+
+
+def test_looking_at_the_configuration_space_shows_it(browsing):
+    bench = Eye(browsing)
+    assert "configuration space" in browsing.session.view.hidden_layers
+    assert "configuration space" not in LookFrom("C-space", None).run(bench).session.view.hidden_layers

@@ -185,9 +185,10 @@ def test_a_click_on_an_edge_looks_at_it(full):
 
 
 def test_hiding_and_showing_a_layer(full):
+    before = full.session.view.hidden_layers
     state = after(full, ShowLayer("robot", False), ShowLayer("robot", False))
-    assert state.session.view.hidden_layers == ("robot",)
-    assert ShowLayer("robot", True).apply(state).session.view.hidden_layers == ()
+    assert state.session.view.hidden_layers == (*before, "robot")
+    assert ShowLayer("robot", True).apply(state).session.view.hidden_layers == before
 
 
 def test_looking_does_not_make_a_session_unsaved(full):

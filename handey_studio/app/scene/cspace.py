@@ -13,6 +13,7 @@ from handey_studio.app.scene.units import SCALE, scaled
 from handey_studio.app.state import State
 from handey_studio.motion import CSpaceSummary
 from handey_studio.motion.free_surface import Surface, free_surfaces, shares
+from handey_studio.task.plan import MoveResult
 
 ROOT, LAYER = "/cspace", "configuration space"
 CORNER_M = np.array([-1.75, -0.45, 0.0])  # the stage's lowest corner in the world: behind the arm, out of its way
@@ -24,27 +25,29 @@ SAMPLES = 160
 
 
 class CSpaceScene:
-    """Built once a plan; the marker and the slice go with the timeline."""
+    """Built once a plan, when it is first looked at; the marker and the slice go with the timeline."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._scene = server.scene
         self._root: viser.FrameHandle | None = None
         self._marker: viser.IcosphereHandle | None = None
         self._slice: viser.FrameHandle | None = None
+        self._result: MoveResult | None = None
 
     def render(self, old: State | None, new: State) -> None:
-        if old is None or old.session.result is not new.session.result:
-            self._build(new)
-            old = None
-        if self._root is None or (old is not None and _looks(old) == _looks(new)):
+        if old is not None and _looks(old) == _looks(new):
             return
-        self._root.visible = LAYER not in new.session.view.hidden_layers
-        self._move(new)
+        shown = LAYER not in new.session.view.hidden_layers
+        if shown and self._result is not new.session.result:
+            self._build(new)
+        if self._root is not None:
+            self._root.visible = shown
+            self._move(new)
 
     def _build(self, state: State) -> None:
         self._scene.remove_by_name(ROOT)
         self._root = self._marker = self._slice = None
-        replay = state.replay
+        self._result, replay = state.session.result, state.replay
         if replay is None or replay.plan.space is None:
             return
         space = replay.plan.space
@@ -99,4 +102,4 @@ def _unbroken(points: NDArray) -> NDArray:
 
 
 def _looks(state: State) -> tuple:
-    return state.session.view.time_s, LAYER in state.session.view.hidden_layers
+    return id(state.session.result), state.session.view.time_s, LAYER in state.session.view.hidden_layers
