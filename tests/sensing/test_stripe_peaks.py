@@ -32,8 +32,9 @@ def test_a_stripe_is_found_where_it_was_drawn(start, slope, sigma, light, room, 
     peaks = found(image)
     assert len(peaks.uv) >= 0.95 * ROWS
     off = peaks.uv[:, 0] - centres[peaks.uv[:, 1].astype(int)]
-    assert np.sqrt(np.mean(off**2)) < 0.03 + 6.0 * sigma / light  # noise moves a broad faint stripe more
-    assert abs(np.median(off)) < 0.02 + sigma / light
+    width = max(sigma, 1.0)  # a stripe thinner than a pixel is seen as wide as one
+    assert np.sqrt(np.mean(off**2)) < 0.03 + 6.0 * width / light  # noise moves a broad faint stripe more
+    assert abs(np.median(off)) < 0.02 + width / light
 
 
 def test_a_stripe_across_is_the_same_stripe_turned():
