@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.penetration import Polytope, overlap, polytope, polytopes_of
-from handey_studio.cell.protocol import Motion
 from handey_studio.geometry.transforms import apply
+from handey_studio.motion import Trajectory
 from handey_studio.world.arm import Arm, hand_hulls
 
 STRIDE_M = 2.5e-4  # the hand moves no further between two looks
@@ -19,7 +19,7 @@ BISECTIONS = 20
 Placed = list[tuple[Polytope, NDArray]]  # a convex piece and its pose
 
 
-def first_touch(arm: Arm, motion: Motion, others: Sequence[SolidBody], held: tuple[SolidBody, NDArray] | None) -> float | None:
+def first_touch(arm: Arm, motion: Trajectory, others: Sequence[SolidBody], held: tuple[SolidBody, NDArray] | None) -> float | None:
     """Time [s] at which the hand or the held body (with its T_hand_body) first touches one of the others, None if never.
 
     A pair that overlaps at the start may stay as deep as it is; the arm's links are not looked at.
@@ -49,7 +49,7 @@ def first_touch(arm: Arm, motion: Motion, others: Sequence[SolidBody], held: tup
     return None
 
 
-def motion_at(motion: Motion, time: float) -> NDArray:
+def motion_at(motion: Trajectory, time: float) -> NDArray:
     """The configuration (joints,) [rad] at a time [s]."""
     return np.array([np.interp(time, motion.time_s, column) for column in motion.q_rad.T])
 
@@ -61,7 +61,7 @@ def _bisect(touches, before: float, after: float) -> float:
     return after
 
 
-def _moving(arm: Arm, motion: Motion, held: tuple[SolidBody, NDArray] | None) -> Placed:
+def _moving(arm: Arm, motion: Trajectory, held: tuple[SolidBody, NDArray] | None) -> Placed:
     """The hand's boxes and the held body's pieces, with their poses in the hand frame."""
     opening = float(motion.hand_opening_m[0])
     moving: Placed = [(polytope(corners), np.eye(4)) for corners in hand_hulls(arm.robot, opening).values()]
@@ -77,7 +77,7 @@ def _balls(placed: Placed) -> tuple[NDArray, NDArray]:
     return np.array([apply(T, middle) for (_, T), middle in zip(placed, middles, strict=True)]), np.array(radii)
 
 
-def _looks(arm: Arm, motion: Motion) -> NDArray:
+def _looks(arm: Arm, motion: Trajectory) -> NDArray:
     """Times [s] so dense that the hand's origin moves less than STRIDE_M between them."""
     origins = arm.hand_pose(motion.q_rad)[:, :3, 3]
     steps = np.maximum(1, np.ceil(np.linalg.norm(np.diff(origins, axis=0), axis=1) / STRIDE_M)).astype(int)

@@ -10,20 +10,8 @@ from typing import Protocol
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
+from handey_studio.motion import Trajectory
 from handey_studio.sensing.depth_map import DepthMap
-
-
-@dataclass(frozen=True, eq=False)
-class Motion(Value):
-    """A joint path over time: `time_s` (n,) from zero, `q_rad` (n, joints), `hand_opening_m` (n,); linear in between."""
-
-    time_s: NDArray
-    q_rad: NDArray
-    hand_opening_m: NDArray
-
-    def __post_init__(self) -> None:
-        for key in ("time_s", "q_rad", "hand_opening_m"):
-            object.__setattr__(self, key, frozen_array(getattr(self, key)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +48,11 @@ class Cell(Protocol):
         """How far the fingers are open now [m]."""
         ...
 
-    def follow(self, motion: Motion) -> Moved:
+    def follow(self, motion: Trajectory) -> Moved:
         """Move along the whole motion. It must start where the arm stands."""
         ...
 
-    def descend(self, motion: Motion) -> Moved:
+    def descend(self, motion: Trajectory) -> Moved:
         """A guarded motion: as `follow`, but it ends where what the hand carries, or the bare hand, first touches something.
 
         Without touch it runs to its end and reports `contact` False.

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
-from handey_studio.cell.protocol import CannotAct, Motion, Moved
+from handey_studio.cell.protocol import CannotAct, Moved
 from handey_studio.geometry.transforms import is_rigid
+from handey_studio.motion import Trajectory
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.world.robot import Robot
 
@@ -43,10 +44,10 @@ class RecordedCell:
     def contact(self) -> bool:
         return False
 
-    def follow(self, motion: Motion) -> Moved:
+    def follow(self, motion: Trajectory) -> Moved:
         raise _refusal()
 
-    def descend(self, motion: Motion) -> Moved:
+    def descend(self, motion: Trajectory) -> Moved:
         raise _refusal()
 
     def grip(self, opening: float) -> float:

@@ -10,9 +10,10 @@ from handey_studio.cell.bodies import SolidBody, check_names, fixed_bodies, soli
 from handey_studio.cell.gripping import close_fingers
 from handey_studio.cell.guarded import first_touch, motion_at
 from handey_studio.cell.physics import settle
-from handey_studio.cell.protocol import CannotAct, Motion, Moved
+from handey_studio.cell.protocol import CannotAct, Moved
 from handey_studio.cell.stripes import photograph
 from handey_studio.cell.workcell import SimulatedSetup, Workcell
+from handey_studio.motion import Trajectory
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.world.arm import arm_of
 from handey_studio.world.library import Library
@@ -66,11 +67,11 @@ class SimulatedCell:
     def contact(self) -> bool:
         return self._pressing
 
-    def follow(self, motion: Motion) -> Moved:
+    def follow(self, motion: Trajectory) -> Moved:
         self._check(motion)
         return self._arrive(motion.q_rad[-1], float(motion.time_s[-1]), float(motion.hand_opening_m[-1]))
 
-    def descend(self, motion: Motion) -> Moved:
+    def descend(self, motion: Trajectory) -> Moved:
         self._check(motion)
         held = None if self._held is None else (self._body(self._held.name), self._held.T_hand_body)
         others = [body for body in self._bodies if held is None or body.name != held[0].name]
@@ -115,7 +116,7 @@ class SimulatedCell:
         bodies = tuple(replace(body, T_world_body=now[body.name]) for body in self._workcell.setup.bodies)
         return replace(self._workcell.setup, bodies=bodies, drop=self._held is not None)
 
-    def _check(self, motion: Motion) -> None:
+    def _check(self, motion: Trajectory) -> None:
         q, times = motion.q_rad, motion.time_s
         if q.ndim != 2 or q.shape[1] != self._arm.n or not len(q) == len(times) == len(motion.hand_opening_m):
             raise CannotAct(f"the motion has angles {q.shape} for {len(times)} times; this arm takes {self._arm.n} angles at each.")

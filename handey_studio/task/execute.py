@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Silent, Value
-from handey_studio.cell.protocol import CannotAct, Cell, Motion, Moved
-from handey_studio.motion import straight_path, time_path
+from handey_studio.cell.protocol import CannotAct, Cell, Moved
+from handey_studio.motion import Trajectory, straight_path, time_path
 from handey_studio.task.plan import MovePlan, Step
-from handey_studio.world import Held, PlacedPart, World, arm_of
+from handey_studio.world import Held, World, arm_of
 
 GRIP_TOLERANCE_M = 0.0025  # the fingers' width on a part may differ from the model's by this much
 EARLY_M = 0.004  # contact this far above the commanded pose is something else than the support
@@ -65,17 +65,17 @@ def _do(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell, reac
     return "", reached
 
 
-def _from_here(step: Step, q: NDArray) -> Motion:
+def _from_here(step: Step, q: NDArray) -> Trajectory:
     """The step's motion, led in from where the guarded descent left the arm: it may have stopped a little off."""
     openings, times = step.hand_opening_m, step.time_s
     if np.abs(step.q_rad[0] - q).max() < 1e-9:
-        return Motion(times, step.q_rad, openings)
-    return Motion(np.concatenate([[0.0], times + 0.2]), np.concatenate([q[None], step.q_rad]), np.concatenate([openings[:1], openings]))
+        return Trajectory(times, step.q_rad, openings)
+    return Trajectory(np.concatenate([[0.0], times + 0.2]), np.concatenate([q[None], step.q_rad]), np.concatenate([openings[:1], openings]))
 
 
 def _place(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell) -> str:
     """Descend until contact; a problem in words if it came too early or not at all."""
-    moved = cell.descend(Motion(step.time_s / GUARDED_SPEED, step.q_rad, step.hand_opening_m))
+    moved = cell.descend(Trajectory(step.time_s / GUARDED_SPEED, step.q_rad, step.hand_opening_m))
     height = _height_above_goal(moved, plan, carried, held)
     if moved.contact:
         return "" if height <= EARLY_M else f"contact {1e3 * height:.1f} mm above the destination, limit {1e3 * EARLY_M:.1f} mm"
@@ -85,15 +85,10 @@ def _place(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell) -
     deeper = straight_path(carried, moved.q_rad, poses, plan.grasp.width, held, step.allowed_contacts)
     if deeper.found:
         timed = time_path(carried.robot, deeper.q_rad, np.full(len(deeper.q_rad), plan.grasp.width))
-        moved = cell.descend(Motion(timed.time_s / GUARDED_SPEED, timed.q_rad, timed.hand_opening_m))
+        moved = cell.descend(Trajectory(timed.time_s / GUARDED_SPEED, timed.q_rad, timed.hand_opening_m))
     return "" if moved.contact else f"no contact down to {1e3 * SEARCH_M:.1f} mm below the destination"
 
 
 def _height_above_goal(moved: Moved, plan: MovePlan, carried: World, held: Held) -> float:
     T_world_part = arm_of(carried.robot).hand_pose(moved.q_rad) @ held.T_hand_part
     return float(T_world_part[2, 3] - plan.T_world_part_goal[2, 3])
-
-
-def part_after(plan: MovePlan, held: Held, reached: NDArray) -> PlacedPart:
-    """The moved instance where it is believed to stand now."""
-    return PlacedPart(plan.part, held.part, reached)

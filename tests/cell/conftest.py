@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from handey_studio.cell.examples import figure1
-from handey_studio.cell.protocol import Motion
 from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.geometry.transforms import transform
+from handey_studio.motion import Trajectory
 from handey_studio.world import Library, Robot, arm_of, load_robot
 from handey_studio.world.library import bundled
 
@@ -30,8 +30,8 @@ class PlainStep:
     allowed_contacts: tuple[tuple[str, str], ...] = ()
 
     @property
-    def motion(self) -> Motion:
-        return Motion(self.time_s, self.q_rad, self.hand_opening_m)
+    def motion(self) -> Trajectory:
+        return Trajectory(self.time_s, self.q_rad, self.hand_opening_m)
 
 
 @dataclass(frozen=True)
@@ -91,5 +91,5 @@ def arms(robot) -> Arms:
 def cell(library, robot) -> SimulatedCell:
     """The Figure 1 cell, its arm turned from home to face the pile: straight joint lines from there pass over it."""
     cell = SimulatedCell(figure1(), library)
-    cell.follow(Motion(np.array([0.0, 2.0]), np.array([robot.home, AHEAD]), np.full(2, robot.hand.opening_max)))
+    cell.follow(Trajectory(np.array([0.0, 2.0]), np.array([robot.home, AHEAD]), np.full(2, robot.hand.opening_max)))
     return cell

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from handey_studio.base import BadInput
-from handey_studio.cell.protocol import CannotAct, Cell, Motion
+from handey_studio.cell.protocol import CannotAct, Cell
 from handey_studio.cell.recorded import RecordedCell, read_depth_map, write_depth_map
 from handey_studio.geometry.transforms import transform
+from handey_studio.motion import Trajectory
 from handey_studio.sensing.depth_map import DepthMap
 
 
@@ -31,7 +32,7 @@ def test_it_scans_and_refuses_to_act(kept, robot):
     cell: Cell = RecordedCell.from_file(robot, path)
     assert cell.scan() == depth_map
     assert np.array_equal(cell.joints(), robot.home) and cell.opening() == robot.hand.opening_max and not cell.contact()
-    motion = Motion(np.zeros(1), robot.home[None], np.zeros(1))
+    motion = Trajectory(np.zeros(1), robot.home[None], np.zeros(1))
     for act in (lambda: cell.follow(motion), lambda: cell.descend(motion), lambda: cell.grip(0.0)):
         with pytest.raises(CannotAct, match="recorded depth map"):
             act()

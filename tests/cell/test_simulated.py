@@ -5,10 +5,11 @@ import pytest
 
 from handey_studio.base import BadInput
 from handey_studio.cell.examples import figure1
-from handey_studio.cell.protocol import CannotAct, Cell, Motion
+from handey_studio.cell.protocol import CannotAct, Cell
 from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.cell.workcell import SimulatedSetup, TrueBody, Workcell
 from handey_studio.geometry.transforms import from_xyz_rpy, pose_difference, transform
+from handey_studio.motion import Trajectory
 from handey_studio.world import arm_of
 from tests.cell.conftest import OPEN, over_l_block, raised
 
@@ -126,7 +127,7 @@ def test_motions_that_an_arm_could_not_start_are_refused(cell, robot):
     ]
     for angles, at, openings, words in bad:
         with pytest.raises(CannotAct, match=words):
-            cell.follow(Motion(at, angles, openings))
+            cell.follow(Trajectory(at, angles, openings))
     with pytest.raises(CannotAct, match="hand opens"):
         cell.grip(0.2)
     assert np.array_equal(cell.joints(), q)
