@@ -39,6 +39,7 @@ from handey_studio.world.collision_queries import (
     least_clearance,
     placed,
 )
+from handey_studio.world.column_depth import Directions, column_depths, directions_of
 from handey_studio.world.part import Held
 from handey_studio.world.robot import Robot
 from handey_studio.world.world import World
@@ -93,6 +94,10 @@ class Bodies:
 
     def place(self, poses: NDArray, opening: float) -> Placing:
         return Placing(poses, opening, placed(self.shapes, poses, float(opening)))
+
+    def directions(self, b: int) -> Directions:
+        """Face normals and edges of body b in its link's frame."""
+        return directions_of(self.shapes.corners[self.shapes.first[b] : self.shapes.first[b + 1]])
 
     def fcl_object(self, b: int, placing: Placing) -> fcl.CollisionObject:
         """Body b where it is."""
@@ -189,23 +194,37 @@ class CollisionModel:
         if not (scene.rules == ALLOWED).any():
             return Clearance(float(found), names)
         overlaps = [Hit(*overlap) for overlap in allowed_overlaps(bodies.shapes, placing.corners, scene)]
-        depths = [(self._depth(overlap, bodies, placing), self.pair(overlap, bodies)) for overlap in overlaps]
-        depth, pair = max(depths, default=(0.0, ()))
-        return Clearance(float(found), names, float(depth), pair)
+        depth, deepest = max(self._depths(overlaps, bodies, placing), default=(0.0, None))
+        return Clearance(float(found), names, float(depth), self.pair(deepest, bodies) if deepest else ())
+
+    def _depths(self, overlaps: list[Hit], bodies: Bodies, placing: Placing) -> list[tuple[float, Hit]]:
+        """How deep [m] each of several overlaps is; of those of one body with the depth map only the deepest."""
+        columns: dict[int, list[Hit]] = {}
+        for overlap in overlaps:
+            if overlap.kind == 1:
+                columns.setdefault(overlap.body, []).append(overlap)
+        deepest = [max(zip(self._in_columns(hits, bodies, placing), hits, strict=True)) for hits in columns.values()]
+        return [*deepest, *((self._depth(hit, bodies, placing), hit) for hit in overlaps if hit.kind != 1)]
+
+    def _in_columns(self, hits: list[Hit], bodies: Bodies, placing: Placing) -> list[float]:
+        """How deep [m] one body stands in each of the columns that it meets: many of them tell how deep a wide body stands."""
+        b = hits[0].body
+        columns = self.terrain.corners.reshape(-1, 8, 3)[[hit.other for hit in hits]]
+        R = placing.poses[bodies.shapes.link[b], :3, :3]
+        return column_depths(self._moving(b, bodies, placing), bodies.directions(b), R, columns).tolist()
 
     def _depth(self, hit: Hit, bodies: Bodies, placing: Placing) -> float:
-        """How deep [m] two bodies overlap. A column is as narrow as the map's cell: many of them tell how deep a wide body stands."""
+        """How deep [m] two bodies overlap."""
+        if hit.kind == 1:
+            return self._in_columns([hit], bodies, placing)[0]
         mine = self._moving(hit.body, bodies, placing)
         if hit.kind == 2:
             theirs = self._moving(hit.other, bodies, placing)
             return penetration(bodies.fcl_object(hit.body, placing), bodies.fcl_object(hit.other, placing), least_side(mine, theirs))
-        fixed = self.solids if hit.kind == 0 else self.terrain
-        corners = fixed.corners[fixed.first[hit.other] : fixed.first[hit.other + 1]]
+        corners = self.solids.corners[self.solids.first[hit.other] : self.solids.first[hit.other + 1]]
         most = least_side(mine, corners)
         if most <= ALLOWED_DEPTH_M:  # so little that the exact depth would change nothing
             return most
-        if hit.kind == 1:
-            return column_depth(mine, bodies.fcl_object(hit.body, placing), corners)
         if hit.other not in self._fixed:
             self._fixed[hit.other] = fcl_convex(corners)
         return penetration(bodies.fcl_object(hit.body, placing), fcl.CollisionObject(self._fixed[hit.other]), most)
@@ -235,23 +254,6 @@ def least_side(one: NDArray, other: NDArray) -> float:
     low, high = np.maximum(one.min(axis=0), other.min(axis=0)), np.minimum(one.max(axis=0), other.max(axis=0))
     along = np.minimum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0))
     return float(max(along.min(), 0.0)) if (high >= low).all() else 0.0
-
-
-def column_depth(body: NDArray, one: fcl.CollisionObject, column: NDArray) -> float:
-    """Depth [m] that a body stands in a column of the depth map: upwards out of it, or sideways less the column's own width.
-
-    Where in its cell a column's edge lies the map does not tell, so a body beside it may reach a cell into it.
-    """
-    lift = float(column[:, 2].max() - body[:, 2].min())
-    width = float(np.linalg.norm(column[4] - column[0]))
-    return max(0.0, min(lift, penetration(one, fcl_box(column)) - width))
-
-
-def fcl_box(corners: NDArray) -> fcl.CollisionObject:
-    """A cuboid from its corners (8, 3) [m], in the order in which z changes fastest and x slowest."""
-    sides = corners[[4, 2, 1]] - corners[0]
-    lengths = np.linalg.norm(sides, axis=1)
-    return fcl.CollisionObject(fcl.Box(*lengths), fcl.Transform((sides / lengths[:, None]).T, corners.mean(axis=0)))
 
 
 def fcl_convex(corners: NDArray) -> fcl.Convex:

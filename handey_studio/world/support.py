@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import apply
-from handey_studio.world.collision import column_depth, fcl_convex, least_side, penetration
+from handey_studio.world.collision import fcl_convex, least_side, penetration
 from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, columns_of, solids_of
+from handey_studio.world.column_depth import column_depths, column_distances, directions_of
 from handey_studio.world.gjk import distance
 from handey_studio.world.part import PlacedPart
 from handey_studio.world.world import World
@@ -30,25 +31,32 @@ def neighbours(world: World, placed: PlacedPart, within: float = TOUCHING_M) -> 
     """Every body of the world, other than the part itself, that is nearer to it than `within` [m], nearest first."""
     found: dict[str, Neighbour] = {}
     lowest = float(placed.corners_world[:, 2].min())
-    for part_piece in placed.part.pieces:
-        piece = np.ascontiguousarray(apply(placed.T_world_part, part_piece))
-        mine = fcl.CollisionObject(fcl_convex(piece))
-        for name, corners in _near(world.without(placed.name), piece, within):
-            gap = _gap(name, piece, mine, corners)
-            if gap <= within:
-                before = found.get(name, Neighbour(name, np.inf, False))
-                below = before.below or bool(corners[:, 2].min() < lowest + 2 * within)
-                found[name] = Neighbour(name, min(gap, before.gap), below)
+    for own in placed.part.pieces:
+        piece = np.ascontiguousarray(apply(placed.T_world_part, own))
+        for name, gap, bottom in [*_solids(world.without(placed.name), piece, within), *_columns(world, placed, own, piece, within)]:
+            before = found.get(name, Neighbour(name, np.inf, False))
+            found[name] = Neighbour(name, min(gap, before.gap), before.below or bottom < lowest + 2 * within)
     return tuple(sorted(found.values(), key=lambda neighbour: neighbour.gap))
 
 
-def _near(world: World, piece: NDArray, within: float) -> list[tuple[str, NDArray]]:
-    """Names and corners of the solids and columns whose bounding boxes come near a piece's."""
+def _solids(world: World, piece: NDArray, within: float) -> list[tuple[str, float, float]]:
+    """Name, gap [m] and lowest z [m] of the solids near a piece of corners (n, 3) [m]."""
     low, high = piece.min(axis=0) - within, piece.max(axis=0) + within
-    solids = [(name, corners) for name, corners in solids_of(world) if name != OUTSIDE]
+    near = [(name, c) for name, c in solids_of(world) if name != OUTSIDE and not _apart(c[None], low, high)[0]]
+    gaps = [(name, _gap(piece, np.ascontiguousarray(corners), within), float(corners[:, 2].min())) for name, corners in near]
+    return [found for found in gaps if found[1] <= within]
+
+
+def _columns(world: World, placed: PlacedPart, own: NDArray, piece: NDArray, within: float) -> list[tuple[str, float, float]]:
+    """The same of the depth map: its columns' least gap, and the lowest of them."""
     columns = columns_of(world.terrain, world.table_z, float(world.free_space[1, 2]))
-    near = [(name, corners) for name, corners in solids if not _apart(corners[None], low, high)[0]]
-    return near + [(DEPTH_MAP, corners) for corners in columns[~_apart(columns, low, high)]]
+    columns = columns[~_apart(columns, piece.min(axis=0) - within, piece.max(axis=0) + within)]
+    gaps = column_distances(piece, columns, within + 1e-9)
+    meeting = gaps <= 0.0
+    if meeting.any():
+        gaps[meeting] = -column_depths(piece, directions_of(own), placed.T_world_part[:3, :3], columns[meeting])
+    columns, gaps = columns[gaps <= within], gaps[gaps <= within]
+    return [(DEPTH_MAP, float(gaps.min()), float(columns[:, :, 2].min()))] if len(gaps) else []
 
 
 def _apart(stack: NDArray, low: NDArray, high: NDArray) -> NDArray:
@@ -56,10 +64,8 @@ def _apart(stack: NDArray, low: NDArray, high: NDArray) -> NDArray:
     return (stack.max(axis=1) < low).any(axis=1) | (stack.min(axis=1) > high).any(axis=1)
 
 
-def _gap(name: str, piece: NDArray, mine: fcl.CollisionObject, corners: NDArray) -> float:
-    apart = distance(piece, 0, len(piece), np.ascontiguousarray(corners), 0, len(corners), 1e-9)
+def _gap(piece: NDArray, corners: NDArray, within: float) -> float:
+    apart = distance(piece, 0, len(piece), corners, 0, len(corners), within + 1e-9)
     if apart > 0:
         return float(apart)
-    if name == DEPTH_MAP:
-        return -column_depth(piece, mine, corners)
-    return -penetration(mine, fcl.CollisionObject(fcl_convex(corners)), least_side(piece, corners))
+    return -penetration(fcl.CollisionObject(fcl_convex(piece)), fcl.CollisionObject(fcl_convex(corners)), least_side(piece, corners))

@@ -6,12 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from handey_studio.geometry import box, prism
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
 from handey_studio.world import FINGERS, Block, Held, Part, PlacedPart, World, arm_of
 from handey_studio.world.collision import always_touching, collision_model, fcl_convex, least_side, penetration
+from handey_studio.world.column_depth import column_depths, column_distances, directions_of
 from handey_studio.world.gjk import distance
 from tests.motion.oracle import DOWN, ROBOT, Judge, scene
 
@@ -176,3 +178,24 @@ def test_faces_that_just_touch_are_not_deep():
         brick = brick @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + (0.4, 0.3, 0.0)
         objects = [fcl.CollisionObject(fcl_convex(corners)) for corners in (brick, table)]
         assert penetration(*objects, least_side(brick, table)) <= 1e-5 + 1e-12
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10_000), sides=st.lists(st.floats(0.004, 0.08), min_size=3, max_size=3))
+def test_a_bodys_depth_in_columns_is_that_of_the_minkowski_difference(seed, sides):
+    """Boxes turned at random among columns: the origin's depth in the hull of all differences less a column's width, or the lift."""
+    rng = np.random.default_rng(seed)
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * sides - np.array(sides) / 2
+    R, yaw = Rotation.random(rng=rng).as_matrix(), Rotation.from_euler("z", rng.uniform(0, 6)).as_matrix()
+    body = corners @ R.T + rng.uniform(-0.02, 0.02, 3)
+    low = np.c_[rng.uniform(-0.03, 0.03, (6, 2)), np.full(6, -0.5)]
+    high = np.c_[low[:, :2] + 0.001, rng.uniform(-0.04, 0.04, 6)]
+    pick = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
+    columns = np.where(pick[None], high[:, None], low[:, None]) @ yaw.T
+    depths = column_depths(body, directions_of(corners), R, columns)
+    gaps = column_distances(body, np.ascontiguousarray(columns), 1.0)
+    for column, depth, gap in zip(columns, depths, gaps, strict=True):
+        shift = -ConvexHull((body[:, None] - column[None]).reshape(-1, 3)).equations[:, 3].max()
+        lift = column[:, 2].max() - body[:, 2].min()
+        assert depth == pytest.approx(max(0.0, min(lift, shift - 0.001)), abs=1e-7)
+        assert gap == 0.0 or depth == 0.0
