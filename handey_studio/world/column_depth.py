@@ -1,6 +1,6 @@
 """How deep convex bodies stand in the depth map's columns: separating axes, all columns at once.
 
-The least shift that parts two convex polytopes is along a face normal of either or a cross product of their edges (separating axes; Gottschalk, Lin &
+The least shift that parts two convex polytopes is along a face normal of either or a cross product of their edges (Gottschalk, Lin &
 Manocha 1996, OBBTree); leaving out one of these makes the answer larger, never smaller.
 """
 
