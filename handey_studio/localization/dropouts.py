@@ -16,7 +16,8 @@ SIGMAS = 3.0  # by which two pieces of one line may lie off one another
 UNSURE_ANGLE, MOST_ANGLE = np.deg2rad(0.5), np.deg2rad(8.0)  # adds to the sigma of an angle; the widest that is one direction
 ALIKE = np.cos(np.deg2rad(20.0))  # between the surfaces beside two pieces of one edge
 MARGIN_PX = 3  # beside a dropout, where windows are cut short and ends are trimmed
-UNREAD, UNREAD_OF_ALL = 0.8, 0.25  # shares of a gap without readings: of it less its margins, and of all of it
+UNREAD_OF_ALL = 0.25  # share of a gap that must be without readings
+OTHER = 0.2  # share of it, less its margins, that may show something else than the edge or its surface
 KEPT = 0.8  # of both pieces' pixels that must keep to the common line
 
 
@@ -35,7 +36,8 @@ def over_dropouts(
     merged, number = dict(enumerate(lines)), np.arange(len(lines))
     for i, j in _in_line(view, lines, kinds):
         a, b = int(number[i]), int(number[j])
-        if a == b or not _same_owner(lines[i], lines[j]) or not _unread_between(view, seen, lines[i], lines[j], bool(kinds[i] == JUMP)):
+        jump = bool(kinds[i] == JUMP)
+        if a == b or not _same_owner(lines[i], lines[j]) or not _goes_on(view, seen, lines[i], lines[j], jump):
             continue
         members = np.nonzero((segment >= 0) & np.isin(number[segment], (a, b)))[0]
         (line,) = fitted(seen, outward, kind, u, v, members, np.array([0, len(members)]))
@@ -58,7 +60,7 @@ def _in_line(view: DepthView, lines: tuple[Line, ...], kinds: NDArray) -> list[t
     between = middle[j] - middle[i]
     ahead = np.einsum("ni,ni->n", between, along[i])
     gap = np.abs(ahead) - (length[i] + length[j]) / 2
-    beyond = (gap > 0.0) & (gap <= np.minimum(length[i], length[j]))
+    beyond = (gap > 0.0) & (gap <= (length[i] + length[j]) / 2)
     i, j, between, ahead, gap = (array[beyond] for array in (i, j, between, ahead, gap))
     cosine = np.einsum("ni,ni->n", along[i], along[j])
     turn = SIGMAS * np.sqrt(angle[i] ** 2 + angle[j] ** 2 + UNSURE_ANGLE**2)
@@ -80,21 +82,34 @@ def _same_owner(a: Line, b: Line) -> bool:
     return bool(alike.any(axis=1).all())
 
 
-def _unread_between(view: DepthView, seen: Seen, a: Line, b: Line, jump: bool) -> bool:
-    """Whether the gap between two lines' nearest ends holds no readings: of a jump on its own surface, of a crease on the crease."""
+def _goes_on(view: DepthView, seen: Seen, a: Line, b: Line, jump: bool) -> bool:
+    """Whether nothing that was read in the gap between two lines' nearest ends says that the edge stops there. Of a crease's gap a good
+    part must be unread; beside a jump the near surface must go on, no farther than to the jump, and nothing nearer cross it."""
     apart = np.linalg.norm(a.ends[:, None] - b.ends[None], axis=2)
     m, n = np.unravel_index(np.argmin(apart), (2, 2))
-    start, end = a.ends[m], b.ends[n]
-    if jump:
-        pixel = 1.0 / float(np.mean(view.projection.pixels_per_metre(float(start[2]))))
-        start, end = start + pixel * a.inward[0], end + pixel * a.inward[0]
-    ends_uv = view.projection.project(np.stack([start, end]))
+    gap = np.stack([a.ends[m], b.ends[n]])
+    pixel = 1.0 / float(np.mean(view.projection.pixels_per_metre(float(gap[0, 2]))))
+    slack = SIGMAS * view.noise + pixel
+    if not jump:
+        behind = _behind(view, gap)
+        return bool(np.isnan(behind).mean() >= UNREAD_OF_ALL) and _seldom(np.abs(behind) > slack, MARGIN_PX + seen.radius)
+    lost = view.outline_error + 2.0 * pixel
+    inside, outside = (_behind(view, gap + side * a.inward[0]) for side in (pixel, -lost))
+    return _seldom(np.abs(inside) > slack, MARGIN_PX) and _seldom(outside < slack, MARGIN_PX)
+
+
+def _behind(view: DepthView, ends: NDArray) -> NDArray:
+    """How far [m] readings lie behind a line (2, 3), at the places along it: NaN where nothing was read."""
+    ends_uv = view.projection.project(ends)
     steps = max(2, int(np.ceil(np.abs(ends_uv[1] - ends_uv[0]).max())) + 1)
     u, v = np.rint(np.linspace(ends_uv[0], ends_uv[1], steps)).astype(int).T
     height, width = view.depth.shape
-    if u.min() < 0 or v.min() < 0 or u.max() >= width or v.max() >= height:
-        return False
-    unread = np.isnan(np.asarray(view.depth)[v, u])
-    margin = MARGIN_PX if jump else MARGIN_PX + seen.radius
-    inside = unread[margin : len(unread) - margin]
-    return bool(unread.mean() >= UNREAD_OF_ALL and (not len(inside) or inside.mean() >= UNREAD))
+    within = (u >= 0) & (v >= 0) & (u < width) & (v < height)
+    depth = np.asarray(view.depth)[np.where(within, v, 0), np.where(within, u, 0)]
+    return np.where(within, depth, np.nan) - np.linspace(ends[0, 2], ends[1, 2], steps)
+
+
+def _seldom(off: NDArray, margin: int) -> bool:
+    """Whether at most a few of the places along a gap, less `margin` at both ends, are off."""
+    off = off[margin : len(off) - margin]
+    return bool(off.sum() <= OTHER * len(off))
