@@ -41,7 +41,7 @@ def answer_path(
     opening, rng = robot.hand.opening_min, np.random.default_rng(seed)
     result = plan_path(world, asked.start, asked.goal, opening, options=options, rng=rng, progress=progress or Silent())
     planned = time.perf_counter()
-    trajectory = time_path(robot, result.q_rad) if result.found else None
+    trajectory = time_path(robot, result, opening) if result.found else None
     timing = {"read": read - begun, "plan": planned - read, "time": time.perf_counter() - planned}
     return PathAnswer(robot, result, trajectory, timing)
 

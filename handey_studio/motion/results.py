@@ -1,6 +1,6 @@
 """What arm motion hands on: certificates, paths, the picture of the configuration space, timed trajectories."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from numpy.typing import NDArray
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from handey_studio.base import Entry, Value, frozen_array
 
 LegName = Literal["start", "free", "goal", "direct", "straight"]
+OTHER_WAY: dict[LegName, LegName] = {"start": "goal", "goal": "start"}
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,14 @@ class PathResult(Value):
     @property
     def found(self) -> bool:
         return self.status == "found"
+
+    def reversed(self) -> "PathResult":
+        """The same motion the other way round; its certificate holds for both directions."""
+        last, certificate = len(self.q_rad) - 1, self.certificate
+        if certificate is not None:
+            certificate = replace(certificate, at=(max(0, last - 1 - certificate.at[0]), 1.0 - certificate.at[1]))
+        legs = tuple(Leg(OTHER_WAY.get(leg.name, leg.name), last - leg.last, last - leg.first) for leg in self.legs[::-1])
+        return replace(self, q_rad=self.q_rad[::-1], certificate=certificate, legs=legs)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,33 +8,29 @@ by what its acceleration limit gives in 20 ms; a sharp corner is all but a stop,
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
-from handey_studio.motion.results import Trajectory
+from handey_studio.motion.results import PathResult, Trajectory
 from handey_studio.world import Robot
 
 SAMPLE_S = 0.02
 
 
-def time_path(robot: Robot, q_rad: ArrayLike, opening: ArrayLike | None = None, speed: float = 1.0) -> Trajectory:
-    """The trajectory along a path q_rad (n, joints) [rad], from rest to rest, at `speed`, a share of the limits in (0, 1].
+def time_path(robot: Robot, path: PathResult, opening: float) -> Trajectory:
+    """The trajectory along a path that was found, from rest to rest, with the fingers `opening` [m] apart.
 
-    `opening` [m] is one number or one a point, linear between; 0 when not given. On each segment the speed is a trapezoid;
-    samples are at most 20 ms apart. A path of one point, or that stays where it is, takes no time and comes back as one sample.
+    On each segment the speed is a trapezoid; samples are at most 20 ms apart. A path of one point, or that stays where it is, takes no
+    time and comes back as one sample.
     """
-    path = np.asarray(q_rad, dtype=float)
-    if path.ndim != 2 or path.shape[1] != len(robot.velocity) or not len(path) or not np.isfinite(path).all():
-        raise BadInput(f"a path must be finite angles (n ≥ 1, {len(robot.velocity)}), this one has shape {path.shape}.")
-    if not 0.0 < speed <= 1.0:
-        raise BadInput(f"the speed {speed:g} is no share of the joint limits; choose one above 0 and up to 1.")
-    openings = np.array(np.broadcast_to(0.0 if opening is None else np.asarray(opening, dtype=float), len(path)))
-    keep = np.r_[True, np.abs(np.diff(path, axis=0)).max(axis=1) > 1e-12]
-    path, openings = path[keep], openings[keep]
-    if len(path) == 1:
-        return Trajectory(np.zeros(1), path, openings)
-    lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
-    directions = np.diff(path, axis=0) / lengths[:, None]
+    points = path.q_rad
+    if not len(points) or points.shape[1] != len(robot.velocity):
+        raise BadInput(f"a path to be timed needs points of {len(robot.velocity)} angles, this one has {points.shape}: {path.reason}.")
+    points = points[np.r_[True, np.abs(np.diff(points, axis=0)).max(axis=1) > 1e-12]]
+    if len(points) == 1:
+        return Trajectory(np.zeros(1), points, np.array([opening]))
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    directions = np.diff(points, axis=0) / lengths[:, None]
     with np.errstate(divide="ignore"):
         fastest = (robot.velocity / np.abs(directions)).min(axis=1)
         hardest = (robot.acceleration / np.abs(directions)).min(axis=1)
@@ -45,9 +41,8 @@ def time_path(robot: Robot, q_rad: ArrayLike, opening: ArrayLike | None = None, 
         before = rows[-1][0]
         rows += [(before + t, k, s / lengths[k]) for t, s in zip(times, places, strict=True)]
     time, segment, share = (np.array(column) for column in zip(*rows, strict=True))
-    a, b = path[segment], path[segment + 1]
-    widths = openings[segment] + share * (openings[segment + 1] - openings[segment])
-    return Trajectory(time / speed, a + share[:, None] * (b - a), widths)
+    a, b = points[segment], points[segment + 1]
+    return Trajectory(time, a + share[:, None] * (b - a), np.full(len(time), opening))
 
 
 def _corner_speeds(robot: Robot, directions: NDArray, lengths: NDArray, fastest: NDArray, hardest: NDArray) -> NDArray:

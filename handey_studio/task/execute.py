@@ -84,7 +84,7 @@ def _place(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell) -
     poses[:, 2, 3] -= np.linspace(0.0, SEARCH_M, len(poses))
     deeper = straight_path(carried, moved.q_rad, poses, plan.grasp.width, held, step.allowed_contacts)
     if deeper.found:
-        timed = time_path(carried.robot, deeper.q_rad, np.full(len(deeper.q_rad), plan.grasp.width))
+        timed = time_path(carried.robot, deeper, plan.grasp.width)
         moved = cell.descend(Trajectory(timed.time_s / GUARDED_SPEED, timed.q_rad, timed.hand_opening_m))
     return "" if moved.contact else f"no contact down to {1e3 * SEARCH_M:.1f} mm below the destination"
 

@@ -94,7 +94,7 @@ def _pickup_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
     lifted = _raised(grasp, grasp.T_world_hand_pickup)
     allowed = goal.supports_at_start
     away = _straight(goal.carried, q, lifted, choice.width, held_part(grasp), allowed, "lift", grasp.entry, ledger)
-    return None if away is None else _End(q, _reversed(into), away)
+    return None if away is None else _End(q, into.reversed(), away)
 
 
 def _putdown_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
@@ -105,7 +105,7 @@ def _putdown_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> _End | None:
     if down is None:
         return None
     away = _straight(goal.at_goal, q, grasp.retreat_hands, choice.opening, None, (), "retreat", grasp.entry, ledger)
-    return None if away is None else _End(q, _reversed(down), away)
+    return None if away is None else _End(q, down.reversed(), away)
 
 
 def _carry(
@@ -158,35 +158,34 @@ def _steps(
     grip = finger_pairs(held.name)
     lift_pairs, place_pairs = goal.supports_at_start, goal.supports_at_goal
     wide, tight = choice.opening, choice.width
-    rows: list[tuple[StepKind, World, NDArray, tuple[float, float], Held | None, Pairs]] = [
-        ("free", goal.at_start, start.q[None], (start.opening, wide), None, ()),
-        ("free", goal.at_start, there.q_rad, (wide, wide), None, ()),
-        ("approach", goal.at_start, pickup.towards.q_rad, (wide, wide), None, ()),
-        ("close", goal.at_start, pickup.q[None], (wide, tight), None, grip),
-        ("lift", goal.carried, pickup.away.q_rad, (tight, tight), held, grip + lift_pairs),
-        ("transfer", goal.carried, transfer.q_rad, (tight, tight), held, grip),
-        ("place", goal.carried, putdown.towards.q_rad, (tight, tight), held, grip + place_pairs),
-        ("open", goal.at_goal, putdown.q[None], (tight, wide), None, grip),
-        ("retreat", goal.at_goal, putdown.away.q_rad, (wide, wide), None, ()),
-        ("free", goal.at_goal, home.q_rad, (wide, wide), None, ()),
+    rows: list[tuple[StepKind, World, PathResult | NDArray, tuple[float, float], Held | None, Pairs]] = [
+        ("free", goal.at_start, start.q, (start.opening, wide), None, ()),
+        ("free", goal.at_start, there, (wide, wide), None, ()),
+        ("approach", goal.at_start, pickup.towards, (wide, wide), None, ()),
+        ("close", goal.at_start, pickup.q, (wide, tight), None, grip),
+        ("lift", goal.carried, pickup.away, (tight, tight), held, grip + lift_pairs),
+        ("transfer", goal.carried, transfer, (tight, tight), held, grip),
+        ("place", goal.carried, putdown.towards, (tight, tight), held, grip + place_pairs),
+        ("open", goal.at_goal, putdown.q, (tight, wide), None, grip),
+        ("retreat", goal.at_goal, putdown.away, (wide, wide), None, ()),
+        ("free", goal.at_goal, home, (wide, wide), None, ()),
     ]
-    paths = {1: there, 2: pickup.towards, 4: pickup.away, 5: transfer, 6: putdown.towards, 8: putdown.away, 9: home}
     certificates = [
-        paths[k].certificate or _unproved()
-        if k in paths
-        else certify(world, np.repeat(q, 2, axis=0), np.array(openings), None, pairs, CLOSED_MARGIN_M)
-        for k, (_, world, q, openings, _, pairs) in enumerate(rows)
+        way.certificate or _unproved()
+        if isinstance(way, PathResult)
+        else certify(world, np.array([way, way]), np.array(openings), None, pairs, CLOSED_MARGIN_M)
+        for _, world, way, openings, _, pairs in rows
     ]
     return tuple(_step(*row) for row in rows), worst(certificates)
 
 
-def _step(kind: StepKind, world: World, q: NDArray, openings: tuple[float, float], held: Held | None, pairs: Pairs) -> Step:
-    """One timed step; a single configuration means that only the fingers move."""
-    if len(q) == 1:
-        seconds = max(abs(openings[1] - openings[0]) / FINGER_SPEED_M_S, 0.1)
-        timed = Trajectory(np.array([0.0, seconds]), np.repeat(q, 2, axis=0), np.array(openings))
+def _step(kind: StepKind, world: World, way: PathResult | NDArray, openings: tuple[float, float], held: Held | None, pairs: Pairs) -> Step:
+    """One timed step; a configuration (joints,) in place of a path means that only the fingers move."""
+    if isinstance(way, PathResult):
+        timed = time_path(world.robot, way, openings[0])
     else:
-        timed = time_path(world.robot, q, np.full(len(q), openings[0]))
+        seconds = max(abs(openings[1] - openings[0]) / FINGER_SPEED_M_S, 0.1)
+        timed = Trajectory(np.array([0.0, seconds]), np.array([way, way]), np.array(openings))
     return Step(
         kind,
         world.robot.joint_names,
@@ -227,15 +226,6 @@ def _straight(
     entry = ledger.add("straight motion", what, found.reason, parent=parent)
     ledger.adopt(found.entries, parent=entry)
     return None
-
-
-def _reversed(path: PathResult) -> PathResult:
-    """The same motion the other way round; its certificate holds for both directions."""
-    certificate = path.certificate
-    if certificate is not None:
-        segment, share = certificate.at
-        certificate = replace(certificate, at=(max(0, len(path.q_rad) - 2 - segment), 1.0 - share))
-    return replace(path, q_rad=path.q_rad[::-1], certificate=certificate, legs=())
 
 
 def _raised(grasp: Grasp, T_world_hand: NDArray) -> NDArray:
