@@ -2,6 +2,7 @@
 
 from handey_studio.grasping.bump_lines import BumpLines, BumpOptions, BumpRun, bump_lines, plan_approach
 from handey_studio.grasping.classes import GraspClass, GraspGroup, contact_area, grasp_classes, grasp_groups, hand_in_plane, opening_around
+from handey_studio.grasping.free_patches import Patch, PatchOptions, Wanted, free_patches
 from handey_studio.grasping.grasp_placement_table import GraspPlacementTable, TableOptions, grasp_placement_table, legal_at, tilts_at
 from handey_studio.grasping.grasp_plane import GraspPlane, fill_grasp_plane
 from handey_studio.grasping.placements import Placement, PlacementOptions, stable_placements
@@ -21,16 +22,20 @@ __all__ = [
     "GraspPlacementTable",
     "GraspPlane",
     "LegalRotations",
+    "Patch",
+    "PatchOptions",
     "Placement",
     "PlacementOptions",
     "RegraspSequence",
     "SequenceCosts",
     "TableOptions",
     "Transfer",
+    "Wanted",
     "angle_range",
     "bump_lines",
     "contact_area",
     "fill_grasp_plane",
+    "free_patches",
     "grasp_classes",
     "grasp_groups",
     "grasp_placement_table",
