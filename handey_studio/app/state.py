@@ -7,7 +7,7 @@ from pathlib import Path
 from handey_studio.localization import Hypothesis
 from handey_studio.localization.explain import Explanation
 from handey_studio.session import Replay, Session
-from handey_studio.task.plan import MoveCommand
+from handey_studio.task.plan import Carry, MoveCommand
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Robot
 
@@ -104,6 +104,11 @@ class State:
         if result is None or result.plan is None or not result.plan.steps:
             return None
         return _replay(self.robot, result.plan)
+
+    @property
+    def carry(self) -> Carry | None:
+        """The carry of that plan that the timeline is in."""
+        return self.replay.carry_at(self.session.view.time_s) if self.replay is not None else None
 
     @property
     def hypothesis(self) -> Hypothesis | None:

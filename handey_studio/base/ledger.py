@@ -12,12 +12,26 @@ from typing import Any
 
 
 @dataclass(frozen=True)
+class Posture:
+    """How arm, hand and part stood when an option fell, so that it can be shown. Plain numbers; what is not known is empty.
+
+    `q_rad` the arm's joints; or `T_world_hand`, the hand alone: sixteen numbers, row by row, as `T_world_part`, where `part` was.
+    """
+
+    q_rad: tuple[float, ...] = ()
+    T_world_hand: tuple[float, ...] = ()
+    opening_m: float = 0.0
+    part: str = ""
+    T_world_part: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class Entry:
     """One option that was tried.
 
     `reason` says in a few words why it fell, and is None while nothing speaks against it. `value` is the number that
     was measured and `limit` the number it was held against, both in `unit`, which is SI (m, m², rad, s) or a share, a count or
-    nothing (`""`); people read it through `measured`. `bodies` names what collided, if anything.
+    nothing (`""`); people read it through `measured`. `bodies` names what collided, if anything, and `posture` where.
     """
 
     id: int
@@ -29,6 +43,7 @@ class Entry:
     limit: float | None = None
     unit: str = ""
     bodies: tuple[str, ...] = ()
+    posture: Posture | None = None
 
 
 class Ledger:
@@ -52,9 +67,10 @@ class Ledger:
         limit: float | None = None,
         unit: str = "",
         bodies: tuple[str, ...] = (),
+        posture: Posture | None = None,
     ) -> int:
         """Write an entry; its id."""
-        self._entries.append(Entry(len(self._entries), parent, stage, option, reason, value, limit, unit, bodies))
+        self._entries.append(Entry(len(self._entries), parent, stage, option, reason, value, limit, unit, bodies, posture))
         return self._entries[-1].id
 
     def fall(
@@ -66,9 +82,12 @@ class Ledger:
         limit: float | None = None,
         unit: str = "",
         bodies: tuple[str, ...] = (),
+        posture: Posture | None = None,
     ) -> None:
         """The option of `entry`, open until now, fell for `reason`."""
-        self._entries[entry] = replace(self._entries[entry], reason=reason, value=value, limit=limit, unit=unit, bodies=bodies)
+        self._entries[entry] = replace(
+            self._entries[entry], reason=reason, value=value, limit=limit, unit=unit, bodies=bodies, posture=posture
+        )
 
     def adopt(self, entries: Iterable[Entry], parent: int | None = None) -> None:
         """Take over the entries of a stage that was called, below `parent`."""

@@ -80,7 +80,8 @@ def _tell(result: "MoveResult") -> None:
     if result.plan is not None:
         certificate = result.plan.certificate
         clearance = f"{1e3 * certificate.least_clearance:.1f} mm ({' and '.join(certificate.bodies)})"
-        print(f"  grasp: {result.plan.grasp.group}; least clearance {clearance}")
+        grasps = "; then ".join(carry.grasp.group for carry in result.plan.carries)
+        print(f"  grasp: {grasps}; least clearance {clearance}")
     elif result.ledger:
         print(f"  {len(result.ledger)} options in the ledger; the last: {_last_reason(result.ledger)}")
 

@@ -124,3 +124,6 @@ def _check_plan(path: str, plan: MovePlan) -> None:
             raise BadInput(f"{path}.steps[{number}] has clearances of shape {step.clearance_m.shape}; it needs one a time, {n}.")
         if (np.diff(step.time_s) < 0).any():
             raise BadInput(f"{path}.steps[{number}] has times that run backwards.")
+    first = [carry.first_step for carry in plan.carries]
+    if not first or first[0] != 0 or sorted(set(first)) != first or first[-1] > max(len(plan.steps) - 1, 0):
+        raise BadInput(f"{path}.carries begin at the steps {first}; they must begin at step 0 and follow one another.")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Value
-from handey_studio.task.plan import MovePlan
+from handey_studio.task.plan import Carry, MovePlan
 from handey_studio.world import Robot, arm_of
 
 
@@ -62,9 +62,14 @@ class Replay(Value):
         steps = self.plan.steps
         return steps[number].held is None and any(step.held is not None for step in steps[:number])
 
+    def carry_at(self, time_s: float) -> Carry:
+        """The carry that is going on at a time [s]: the only one, or the one before or after a regrasp."""
+        return self.plan.carry_at(self.step_at(time_s))
+
     def share_of(self, kind: str, time_s: float) -> float:
-        """How much of the first step of a kind is done at a time [s]: 0 before it, 1 after it."""
-        number = next((k for k, step in enumerate(self.plan.steps) if step.kind == kind), None)
+        """How much of a carry's first step of a kind is done at a time [s]: 0 before it, 1 after it."""
+        first = self.carry_at(time_s).first_step
+        number = next((k for k, step in enumerate(self.plan.steps) if step.kind == kind and k >= first), None)
         if number is None:
             return 1.0
         start, end = self.starts[number], self.starts[number + 1]

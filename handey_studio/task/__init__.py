@@ -1,7 +1,7 @@
 """§2: MOVE object TO destination — the options, their search, the plan, its execution."""
 
+from handey_studio.task.carrying import Start
 from handey_studio.task.destination import format_pose, goal_poses, parse_destination
-from handey_studio.task.legs import Start
 from handey_studio.task.move import MoveOptions, check_command, plan_move
 from handey_studio.task.plan import GraspChoice, MoveCommand, MovePlan, MoveResult, Step
 from handey_studio.task.run import Station, execute_in, plan_in, run_move, sense

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.base import Ledger, Progress, Silent, Value
+from handey_studio.base import Ledger, Progress, Silent, Value, frozen_array
 from handey_studio.cell.protocol import CannotAct, Cell, Moved
 from handey_studio.motion import Trajectory, straight_path, time_path
-from handey_studio.task.plan import MovePlan, Step
-from handey_studio.world import Held, World, arm_of
+from handey_studio.task.plan import Carry, MovePlan, Step
+from handey_studio.world import Held, Part, World, arm_of
 
 GRIP_TOLERANCE_M = 0.0025  # the fingers' width on a part may differ from the model's by this much
 EARLY_M = 0.004  # contact this far above the commanded pose is something else than the support
@@ -26,15 +26,17 @@ class Performance(Value):
     T_world_part_reached: NDArray | None = None
 
 
-def execute(plan: MovePlan, carried: World, held: Held, cell: Cell, ledger: Ledger, progress: Progress = Silent()) -> Performance:
+def execute(plan: MovePlan, carried: World, part: Part, cell: Cell, ledger: Ledger, progress: Progress = Silent()) -> Performance:
     """Do every step. `carried` is the world without the part, in which the guarded descent is continued."""
     reached = None
     for count, step in enumerate(plan.steps):
         if progress.cancelled:
             return Performance(False, "cancelled", reached)
         progress.report(count / len(plan.steps), f"step {count + 1} of {len(plan.steps)}: {step.kind}")
+        carry = plan.carry_at(count)
+        held = Held(plan.part, part, frozen_array(carry.grasp.T_hand_part))
         try:
-            problem, reached = _do(step, plan, carried, held, cell, reached)
+            problem, reached = _do(step, carry, carried, held, cell, reached)
         except CannotAct as error:
             problem = str(error)
         entry = ledger.add("step", step.kind)
@@ -44,21 +46,21 @@ def execute(plan: MovePlan, carried: World, held: Held, cell: Cell, ledger: Ledg
     return Performance(True, "", reached)
 
 
-def _do(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell, reached: NDArray | None) -> tuple[str, NDArray | None]:
+def _do(step: Step, carry: Carry, carried: World, held: Held, cell: Cell, reached: NDArray | None) -> tuple[str, NDArray | None]:
     """One step; (problem or "", the part's pose by the arm's joints once it was put down)."""
     if step.kind == "close":
-        width = cell.grip(plan.grasp.width - GRIP_TOLERANCE_M)
-        off = abs(width - plan.grasp.width)
+        width = cell.grip(carry.grasp.width - GRIP_TOLERANCE_M)
+        off = abs(width - carry.grasp.width)
         if not cell.contact() or off > GRIP_TOLERANCE_M:
             what = "the fingers closed on nothing" if not cell.contact() else "the fingers hold something of another width"
-            return f"{what}: {1e3 * width:.1f} mm, expected {1e3 * plan.grasp.width:.1f} ± {1e3 * GRIP_TOLERANCE_M:.1f} mm", reached
+            return f"{what}: {1e3 * width:.1f} mm, expected {1e3 * carry.grasp.width:.1f} ± {1e3 * GRIP_TOLERANCE_M:.1f} mm", reached
         return "", reached
     if step.kind == "open":
         reached = arm_of(carried.robot).hand_pose(cell.joints()) @ held.T_hand_part
         cell.grip(float(step.hand_opening_m[-1]))
         return "", reached
     if step.kind == "place":
-        return _place(step, plan, carried, held, cell), reached
+        return _place(step, carry, carried, held, cell), reached
     start = cell.joints()
     path = _from_here(step, start)
     cell.follow(path)
@@ -73,22 +75,22 @@ def _from_here(step: Step, q: NDArray) -> Trajectory:
     return Trajectory(np.concatenate([[0.0], times + 0.2]), np.concatenate([q[None], step.q_rad]), np.concatenate([openings[:1], openings]))
 
 
-def _place(step: Step, plan: MovePlan, carried: World, held: Held, cell: Cell) -> str:
+def _place(step: Step, carry: Carry, carried: World, held: Held, cell: Cell) -> str:
     """Descend until contact; a problem in words if it came too early or not at all."""
     moved = cell.descend(Trajectory(step.time_s / GUARDED_SPEED, step.q_rad, step.hand_opening_m))
-    height = _height_above_goal(moved, plan, carried, held)
+    height = _height_above_goal(moved, carry, carried, held)
     if moved.contact:
         return "" if height <= EARLY_M else f"contact {1e3 * height:.1f} mm above the destination, limit {1e3 * EARLY_M:.1f} mm"
     T_world_hand = arm_of(carried.robot).hand_pose(moved.q_rad)
     poses = np.repeat(T_world_hand[None], 4, axis=0)
     poses[:, 2, 3] -= np.linspace(0.0, SEARCH_M, len(poses))
-    deeper = straight_path(carried, moved.q_rad, poses, plan.grasp.width, held, step.allowed_contacts)
+    deeper = straight_path(carried, moved.q_rad, poses, carry.grasp.width, held, step.allowed_contacts)
     if deeper.found:
-        timed = time_path(carried.robot, deeper, plan.grasp.width)
+        timed = time_path(carried.robot, deeper, carry.grasp.width)
         moved = cell.descend(Trajectory(timed.time_s / GUARDED_SPEED, timed.q_rad, timed.hand_opening_m))
     return "" if moved.contact else f"no contact down to {1e3 * SEARCH_M:.1f} mm below the destination"
 
 
-def _height_above_goal(moved: Moved, plan: MovePlan, carried: World, held: Held) -> float:
+def _height_above_goal(moved: Moved, carry: Carry, carried: World, held: Held) -> float:
     T_world_part = arm_of(carried.robot).hand_pose(moved.q_rad) @ held.T_hand_part
-    return float(T_world_part[2, 3] - plan.T_world_part_goal[2, 3])
+    return float(T_world_part[2, 3] - carry.T_world_part_goal[2, 3])

@@ -4,26 +4,26 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from handey_studio.base import Entry, Ledger, Progress, Share, Silent, describe
+from handey_studio.base import Entry, Ledger, Progress, Silent, describe
 from handey_studio.base.errors import unknown_name
+from handey_studio.task.carrying import Start
 from handey_studio.task.destination import base_name, goal_poses, parse_destination
-from handey_studio.task.grasp_search import grasps_of
-from handey_studio.task.legs import Start, complete
-from handey_studio.task.options import Goal, Option, check_goal, list_options
-from handey_studio.task.plan import MoveCommand, MoveResult
+from handey_studio.task.options import Goal, check_goal
+from handey_studio.task.plan import MoveCommand, MovePlan, MoveResult
+from handey_studio.task.search import OptionSearch, SearchOptions, settle
 from handey_studio.world import Part, PlacedPart, World
 
 
 @dataclass(frozen=True)
 class MoveOptions:
-    """`seed` drives every choice by chance. At most `max_groups` grasp groups are looked at: work is counted, not seconds."""
+    """`seed` drives every choice by chance; `search` bounds the work, which is counted, not timed."""
 
     seed: int = 0
-    max_groups: int = 400
+    search: SearchOptions = field(default_factory=SearchOptions)
 
 
 def check_command(command: MoveCommand, parts: dict[str, Part]) -> None:
@@ -44,31 +44,15 @@ def plan_move(
     """Plan one MOVE in the world as sensed. A MOVE that cannot be planned is a result too, with the reasons in its ledger."""
     check_command(command, parts)
     ledger, timing = Ledger(), {}
-    rng = np.random.default_rng(options.seed)
     with _timed(timing, "destination"):
         goals = _goals(world, command, parts, ledger)
-    plan, reason = None, _goal_reason(world, command, ledger) if not goals else ""
+    plan, reason = None, "" if goals else _goal_reason(world, command, ledger)
     if goals:
-        with _timed(timing, "options"):
-            tries = _within(list_options(goals, ledger), options.max_groups, ledger)
-        for count, option in enumerate(tries):
-            if progress.cancelled:
-                reason = "cancelled"
-                break
-            part = Share(progress, count / len(tries), (count + 1) / len(tries))
-            part.report(0.0, f"grasp group {count + 1} of {len(tries)}: {option.group.name}")
-            entry = ledger.add("grasp group", option.name, parent=option.goal.entry)
-            with _timed(timing, "grasp"):
-                grasps = grasps_of(option, entry, ledger)
-            for grasp in grasps:
-                with _timed(timing, "motion"):
-                    plan = plan or complete(grasp, start, ledger, part, rng)
-            if plan is not None:
-                break
-            if grasps:
-                ledger.fall(entry, "no arm motion was found for its grasps")
-        else:
-            reason = _why_none(ledger.entries)
+        search = OptionSearch(start, ledger, progress, np.random.default_rng(options.seed), options.search)
+        with _timed(timing, "search"):
+            plan = _best(search, goals, options.search.improve)
+        _close(search, plan, ledger)
+        reason = "cancelled" if progress.cancelled and plan is None else _why_none(ledger.entries)
     shown = goals[0] if goals else None
     return MoveResult(
         command,
@@ -82,11 +66,23 @@ def plan_move(
     )
 
 
-def _within(tries: list[Option], limit: int, ledger: Ledger) -> list[Option]:
-    """The best `limit` options; that there are more is in the ledger."""
-    if len(tries) > limit:
-        ledger.add("options", f"{len(tries) - limit} more grasp groups", "not looked at: over the limit", value=len(tries), limit=limit)
-    return tries[:limit]
+def _best(search: OptionSearch, goals: list[Goal], improve: int) -> MovePlan | None:
+    """The first plan, or with `improve` the quickest of that many more."""
+    best = None
+    for count, plan in enumerate(search.run(goals)):
+        best = plan if best is None or plan.duration < best.duration else best
+        if count >= improve:
+            break
+    return best
+
+
+def _close(search: OptionSearch, plan: MovePlan | None, ledger: Ledger) -> None:
+    """What fell because everything below it did, and how much was not looked at."""
+    waiting = search.waiting
+    settle(ledger, {node.entry for node in waiting})
+    if waiting:
+        why = "not looked at: there is a plan" if plan else "not looked at: the effort is spent"
+        ledger.add("options", f"{len(waiting)} more", why, value=search.spent, limit=search.options.effort, unit="s")
 
 
 def _goals(world: World, command: MoveCommand, parts: dict[str, Part], ledger: Ledger) -> list[Goal]:
@@ -123,11 +119,16 @@ def _why_none(entries: tuple[Entry, ...]) -> str:
         return "the hand cannot grasp this part: " + (describe(entries[-1]) if entries else "it has no pair of parallel faces")
     counts = Counter(entry.reason for entry in groups)
     said = "; ".join(f"{count} × {reason}" for reason, count in counts.most_common(3))
-    text = f"none of {len(groups)} grasp groups works: {said}"
-    pickup_only = sum(count for reason, count in counts.items() if reason and "putdown" in reason)
-    if pickup_only:
-        text += f"; {pickup_only} are free at the pickup but not at the putdown: a regrasp might help, which is not built yet"
-    return text
+    return f"none of {len(groups)} grasp groups works: {said}{_why_no_detour(entries)}"
+
+
+def _why_no_detour(entries: tuple[Entry, ...]) -> str:
+    """What became of putting the part down on the way."""
+    tried = sum(entry.stage == "placements" for entry in entries)
+    fallen = [entry.reason for entry in entries if entry.stage == "regrasp" and entry.reason]
+    if tried:
+        return f"; {tried} ways of putting it down and taking it anew did not help"
+    return f"; a regrasp does not help: {fallen[0]}" if fallen else ""
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """The options of a MOVE: which instance, which reading of the destination, which symmetric view of the part, which grasp group.
 
-Handey "simply lists all possible solutions, ranks them heuristically, and tries them sequentially" (§7). Here too, but every one that
-falls leaves its reason in the ledger.
+Handey "simply lists all possible solutions, ranks them heuristically, and tries them sequentially" (§7). Here they are the roots of one
+search (`search`), and every one that falls leaves its reason in the ledger.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Value, frozen_array
 from handey_studio.geometry.transforms import inverse
-from handey_studio.grasping import GraspEnd, GraspGroup, angle_range, grasp_groups
+from handey_studio.grasping import GraspEnd, GraspGroup, angle_range, grasp_groups, opening_around
 from handey_studio.world import PlacedPart, World
 from handey_studio.world.collision import ALLOWED_DEPTH_M
 from handey_studio.world.support import MAX_GAP_M, TOUCHING_M, neighbours
@@ -65,14 +65,21 @@ class Option(Value):
         return GraspEnd(self.goal.at_goal, self.goal.T_world_goal)
 
     @property
+    def opening(self) -> float:
+        """How far [m] the hand opens to go around the part."""
+        return opening_around(self.goal.at_start.robot.hand, self.group.grasp_class.width)
+
+    @property
     def name(self) -> str:
         turned = f", symmetry {self.symmetry}" if self.symmetry else ""
         return f"{self.group.name}{turned}"
 
 
-def check_goal(world: World, instance: PlacedPart, label: str, T_world_goal: NDArray, ledger: Ledger) -> Goal | None:
+def check_goal(
+    world: World, instance: PlacedPart, label: str, T_world_goal: NDArray, ledger: Ledger, parent: int | None = None
+) -> Goal | None:
     """The goal, if the part can stand there: nothing in its way and something below it. Else None, and why in the ledger."""
-    entry = ledger.add("destination", f"{instance.name} to {label}")
+    entry = ledger.add("destination", f"{instance.name} to {label}", parent=parent)
     carried = world.without(instance.name)
     placed = PlacedPart(instance.name, instance.part, T_world_goal)
     low, high = world.free_space
@@ -101,18 +108,17 @@ def check_goal(world: World, instance: PlacedPart, label: str, T_world_goal: NDA
     return Goal(instance, label, T_world_goal, entry, world, carried, carried.with_part(placed), at_start, at_goal)
 
 
-def list_options(goals: list[Goal], ledger: Ledger) -> list[Option]:
-    """Every option of the goals, best first: the most vertical fingers over both ends, then the nearest to the centre of mass."""
+def options_of(goal: Goal, ledger: Ledger) -> list[Option]:
+    """Every option of a goal, with what it costs [rad]: the fingers' tilt over both ends, and how far from the centre of mass they grip."""
+    part, hand = goal.instance.part, goal.at_start.robot.hand
+    groups, entries = grasp_groups(part, hand)
+    ledger.adopt(entries, parent=goal.entry)
     options = []
-    for goal in goals:
-        part, hand = goal.instance.part, goal.at_start.robot.hand
-        groups, entries = grasp_groups(part, hand)
-        ledger.adopt(entries, parent=goal.entry)
-        for symmetry in range(len(part.symmetries)):
-            T_start = goal.instance.T_world_part @ part.symmetries[symmetry]
-            for group in groups:
-                options.append(Option(goal, symmetry, group, _cost(group, part.solid.volume_and_centroid[1], T_start, goal.T_world_goal)))
-    return sorted(options, key=lambda option: option.cost)
+    for symmetry in range(len(part.symmetries)):
+        T_start = goal.instance.T_world_part @ part.symmetries[symmetry]
+        for group in groups:
+            options.append(Option(goal, symmetry, group, _cost(group, part.solid.volume_and_centroid[1], T_start, goal.T_world_goal)))
+    return options
 
 
 def _cost(group: GraspGroup, centroid: NDArray, T_world_start: NDArray, T_world_goal: NDArray) -> float:

@@ -77,18 +77,55 @@ class GraspChoice(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class MovePlan(Value):
-    """A full plan. Poses (4, 4). `approach` is the bump-line run at the pickup, `space` the configuration space of the transfer."""
+class Carry(Value):
+    """One pickup and putdown of a plan: all of it, or a stretch between two regrasps.
 
-    part: str
+    Poses (4, 4); the start may be named by another symmetry of the part than the goal of the carry before. `approach` is the bump-line run
+    at the pickup, `space` the configuration space of the transfer, `first_step` the plan's first step that belongs to it.
+    """
+
     T_world_part_start: NDArray
     T_world_part_goal: NDArray
     grasp: GraspChoice
-    steps: tuple[Step, ...]
-    certificate: Certificate
     approach: BumpRun
     space: CSpaceSummary | None = None
-    regrasps: int = 0
+    first_step: int = 0
+
+    def __post_init__(self) -> None:
+        for key in ("T_world_part_start", "T_world_part_goal"):
+            object.__setattr__(self, key, frozen_array(getattr(self, key)))
+
+
+@dataclass(frozen=True, eq=False)
+class MovePlan(Value):
+    """A full plan: one carry, or several with a regrasp between each two."""
+
+    part: str
+    carries: tuple[Carry, ...]
+    steps: tuple[Step, ...]
+    certificate: Certificate
+
+    @property
+    def regrasps(self) -> int:
+        """How often the part is put down on the way."""
+        return len(self.carries) - 1
+
+    @property
+    def T_world_part_start(self) -> NDArray:
+        return self.carries[0].T_world_part_start
+
+    @property
+    def T_world_part_goal(self) -> NDArray:
+        return self.carries[-1].T_world_part_goal
+
+    @property
+    def duration(self) -> float:
+        """Length of all steps together [s]."""
+        return sum(float(step.time_s[-1]) for step in self.steps)
+
+    def carry_at(self, step: int) -> Carry:
+        """The carry that a step belongs to."""
+        return [carry for carry in self.carries if carry.first_step <= max(step, 0)][-1]
 
 
 @dataclass(frozen=True, eq=False)

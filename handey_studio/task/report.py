@@ -6,7 +6,7 @@ import numpy as np
 
 from handey_studio.base import entry_report, rejected_counts
 from handey_studio.motion.answer import certificate_report
-from handey_studio.task.plan import GraspChoice, MoveResult, Step
+from handey_studio.task.plan import Carry, GraspChoice, MoveResult, Step
 from handey_studio.world import Robot
 
 
@@ -17,7 +17,7 @@ def move_report(results: list[MoveResult], robot: Robot) -> dict[str, Any]:
 
 def _move(result: MoveResult, robot: Robot) -> dict[str, Any]:
     plan = result.plan
-    stages = {"destination", "grasp group", "grasp class", "approach group", "approach", "reach", "arm motion"}
+    stages = {"destination", "grasp group", "grasp class", "approach group", "approach", "reach", "straight motion", "arm motion"}
     options = [entry for entry in result.ledger if entry.stage in stages]
     return {
         "part": plan.part if plan else result.command.part,
@@ -27,14 +27,24 @@ def _move(result: MoveResult, robot: Robot) -> dict[str, Any]:
         "T_world_part_start": plain(result.T_world_part_start),
         "T_world_part_goal": plain(result.T_world_part_goal),
         "T_world_part_reached": plain(result.T_world_part_reached),
-        "grasp": _grasp(plan.grasp) if plan else None,
+        "grasp": _grasp(plan.carries[0].grasp) if plan else None,
         "regrasps": plan.regrasps if plan else 0,
+        "carries": [_carry(carry) for carry in plan.carries] if plan else [],
         "steps": [_step(step, robot) for step in plan.steps] if plan else [],
         "certificate": certificate_report(plan.certificate) if plan else None,
         "options": {"tried": len(options), "rejected": rejected_counts(options)},
         "ledger": [entry_report(entry) for entry in result.ledger],
         "physics": result.physics,
         "timing_s": result.timing_s,
+    }
+
+
+def _carry(carry: Carry) -> dict[str, Any]:
+    return {
+        "first_step": carry.first_step,
+        "T_world_part_start": plain(carry.T_world_part_start),
+        "T_world_part_goal": plain(carry.T_world_part_goal),
+        "grasp": _grasp(carry.grasp),
     }
 
 

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.base import BadInput, Ledger, Progress, Share, Silent, Value, frozen_array
+from handey_studio.base import BadInput, Ledger, Progress, Share, Silent, Value
 from handey_studio.cell.protocol import CannotAct, Cell
 from handey_studio.cell.workcell import Workcell
 from handey_studio.localization import LocateOptions
+from handey_studio.task.carrying import Start
 from handey_studio.task.execute import execute
-from handey_studio.task.legs import Start
 from handey_studio.task.move import MoveOptions, check_command, plan_move
 from handey_studio.task.plan import MoveCommand, MoveResult
 from handey_studio.task.sense import Scene, believed_world, understand
-from handey_studio.world import Held, Part, Robot
+from handey_studio.world import Part, Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +72,7 @@ def execute_in(station: Station, scene: Scene, result: MoveResult, cell: Cell, p
     part = station.models[plan.part.split("#")[0]]
     carried = believed_world(station.workcell, station.robot, scene).without(plan.part)
     begun = time.perf_counter()
-    held = Held(plan.part, part, frozen_array(plan.grasp.T_hand_part))
-    ended = execute(plan, carried, held, cell, ledger, progress)
+    ended = execute(plan, carried, part, cell, ledger, progress)
     return replace(
         result,
         status="done" if ended.done else "failed",

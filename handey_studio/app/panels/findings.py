@@ -9,8 +9,8 @@ from handey_studio.app.state import State
 from handey_studio.app.svg import grasp_plane_html
 from handey_studio.app.wire import set_to
 from handey_studio.geometry.transforms import pose_difference
-from handey_studio.task.legs import TOLD_M
-from handey_studio.task.plan import MovePlan, MoveResult
+from handey_studio.task.carrying import TOLD_M
+from handey_studio.task.plan import GraspChoice, MovePlan, MoveResult
 
 NO_RESULT = "No MOVE was tried yet. Set the part and its destination on the left, then press Plan or MOVE."
 NO_PATH = "No path yet. A plan shows here what was proved of it, and the arm's way through the configuration space."
@@ -41,9 +41,10 @@ class GraspPanel:
         replay = new.replay
         if replay is None:
             set_to(self._pane, content=html.empty(NO_GRASP, "grasp-empty"))
-        elif old is None or old.session.result is not new.session.result or approach_point(old) != approach_point(new):
-            picture = grasp_plane_html(replay.plan.approach, new.robot.hand, approach_point(new))
-            self._pane.content = html.facts(grasp_facts(replay.plan), "grasp") + picture
+        elif old is None or _grasp_looks(old) != _grasp_looks(new):
+            carry = replay.carry_at(new.session.view.time_s)
+            picture = grasp_plane_html(carry.approach, new.robot.hand, approach_point(new))
+            self._pane.content = html.facts(grasp_facts(carry.grasp), "grasp") + picture
 
 
 class PathPanel:
@@ -57,7 +58,8 @@ class PathPanel:
         if replay is None:
             set_to(self._pane, content=html.empty(NO_PATH, "path-empty"))
         elif old is None or old.session.result is not new.session.result or old.session.view.time_s != new.session.view.time_s:
-            space, moment = replay.plan.space, replay.at(new.session.view.time_s)
+            moment = replay.at(new.session.view.time_s)
+            space = replay.carry_at(moment.time_s).space
             picture = slice_html(space, moment.q_rad) if space is not None else html.empty(NO_SPACE)
             now = html.facts([("Clearance now", clearance_words(replay.clearance(moment.time_s)))], "clearance-now")
             self._pane.content = html.facts(path_facts(replay.plan), "path") + now + clearance_legend() + picture
@@ -81,7 +83,12 @@ def approach_point(state: State) -> int:
     replay = state.replay
     if replay is None:
         return 0
-    return round(replay.share_of("approach", state.session.view.time_s) * (len(replay.plan.approach.path) - 1))
+    time_s = state.session.view.time_s
+    return round(replay.share_of("approach", time_s) * (len(replay.carry_at(time_s).approach.path) - 1))
+
+
+def _grasp_looks(state: State) -> tuple:
+    return state.carry, approach_point(state)
 
 
 def result_html(result: MoveResult) -> str:
@@ -102,8 +109,7 @@ def result_html(result: MoveResult) -> str:
 
 def plan_facts(plan: MovePlan) -> list[tuple[str, str]]:
     """A plan's steps."""
-    seconds = sum(float(step.time_s[-1]) for step in plan.steps)
-    return [("Steps", " → ".join(step.kind for step in plan.steps)), ("Duration", f"{seconds:.1f} s, {plan.regrasps} regrasps")]
+    return [("Steps", " → ".join(step.kind for step in plan.steps)), ("Duration", f"{plan.duration:.1f} s, {plan.regrasps} regrasps")]
 
 
 def path_facts(plan: MovePlan) -> list[tuple[str, str]]:
@@ -118,9 +124,8 @@ def path_facts(plan: MovePlan) -> list[tuple[str, str]]:
     ]
 
 
-def grasp_facts(plan: MovePlan) -> list[tuple[str, str]]:
+def grasp_facts(grasp: GraspChoice) -> list[tuple[str, str]]:
     """The grasp as the paper speaks of it."""
-    grasp = plan.grasp
     ranges = ", ".join(f"{low:.0f}° to {high:.0f}°" for low, high in np.rad2deg(grasp.ranges).reshape(-1, 2))
     return [
         ("Grasp class", grasp.name),

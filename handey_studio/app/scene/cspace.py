@@ -13,7 +13,7 @@ from handey_studio.app.scene.units import SCALE, scaled
 from handey_studio.app.state import State
 from handey_studio.motion import CSpaceSummary
 from handey_studio.motion.free_surface import Surface, free_surfaces, shares
-from handey_studio.task.plan import MoveResult
+from handey_studio.task.plan import Carry
 
 ROOT, LAYER = "/cspace", "configuration space"
 CORNER_M = np.array([-1.75, -0.45, 0.0])  # the stage's lowest corner in the world: behind the arm, out of its way
@@ -32,13 +32,13 @@ class CSpaceScene:
         self._root: viser.FrameHandle | None = None
         self._marker: viser.IcosphereHandle | None = None
         self._slice: viser.FrameHandle | None = None
-        self._result: MoveResult | None = None
+        self._carry: Carry | None = None
 
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
             return
         shown = LAYER not in new.session.view.hidden_layers
-        if shown and self._result is not new.session.result:
+        if shown and (self._root is None or self._carry is not new.carry):
             self._build(new)
         if self._root is not None:
             self._root.visible = shown
@@ -47,10 +47,10 @@ class CSpaceScene:
     def _build(self, state: State) -> None:
         self._scene.remove_by_name(ROOT)
         self._root = self._marker = self._slice = None
-        self._result, replay = state.session.result, state.replay
-        if replay is None or replay.plan.space is None:
+        self._carry, replay = state.carry, state.replay
+        if replay is None or self._carry is None or self._carry.space is None:
             return
-        space = replay.plan.space
+        space = self._carry.space
         self._root = self._scene.add_frame(ROOT, show_axes=False, position=tuple(CORNER_M * SCALE))
         for name, surface, colour in zip(("used", "others"), free_surfaces(space), (palette.PALE_SKY, palette.FILLED), strict=True):
             self._volume(name, surface, colour)
@@ -78,9 +78,9 @@ class CSpaceScene:
 
     def _move(self, state: State) -> None:
         replay = state.replay
-        if replay is None or replay.plan.space is None or self._marker is None or self._slice is None:
+        if replay is None or self._carry is None or self._carry.space is None or self._marker is None or self._slice is None:
             return
-        here = SIDE_M * SCALE * shares(replay.plan.space, replay.at(state.session.view.time_s).q_rad)
+        here = SIDE_M * SCALE * shares(self._carry.space, replay.at(state.session.view.time_s).q_rad)
         self._marker.position = here
         self._slice.position = (here[0], 0.0, 0.0)
 

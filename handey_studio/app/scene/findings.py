@@ -8,8 +8,8 @@ from handey_studio.app import palette
 from handey_studio.app.scene.units import place, scaled
 from handey_studio.app.state import State
 from handey_studio.session import Replay
-from handey_studio.task.legs import TOLD_M
-from handey_studio.task.plan import GraspChoice
+from handey_studio.task.carrying import TOLD_M
+from handey_studio.task.plan import Carry, GraspChoice
 
 PATH, GRASP, BEADS = "/plan/hand_path", "/plan/grasp", "/plan/clearance"
 SAMPLES = 240
@@ -24,12 +24,15 @@ class PlanScene:
         self._grasp: viser.FrameHandle | None = None
         self._path: viser.SceneNodeHandle | None = None
         self._beads: viser.SceneNodeHandle | None = None
+        self._carry: Carry | None = None
 
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
             return
         if old is None or old.session.result is not new.session.result:
             self._build(new)
+        elif new.replay is not None and self._carry is not new.carry:
+            self._build_grasp(new)
         self._show(new)
 
     def _build(self, state: State) -> None:
@@ -42,12 +45,17 @@ class PlanScene:
         scene.add_frame("/plan", show_axes=False)
         points, colours = coloured_path(replay)
         self._path = scene.add_line_segments(PATH, scaled(points), colors=colours, thickness=3.0, thickness_units="screen")
-        self._grasp = add_grasp(scene, replay.plan.grasp)
+        self._build_grasp(state)
         beads = clearance_beads(replay)
         if beads is not None:
             self._beads = scene.add_point_cloud(
                 BEADS, scaled(beads[0]), beads[1], point_size=0.06, point_shape="circle", precision="float32"
             )
+
+    def _build_grasp(self, state: State) -> None:
+        self._carry = state.carry
+        self._server.scene.remove_by_name(GRASP)
+        self._grasp = add_grasp(self._server.scene, self._carry.grasp) if self._carry is not None else None
 
     def _show(self, state: State) -> None:
         """The grasp stays on the part wherever the timeline has it."""

@@ -6,6 +6,7 @@ import viser
 from handey_studio.app import palette
 from handey_studio.app.scene.units import scaled
 from handey_studio.app.state import State
+from handey_studio.task.plan import Carry
 
 LAYER = "wrist box"
 NAME = "/robot/link{link}/wrist_box"  # it goes with the link that carries the wrist
@@ -18,9 +19,10 @@ class WristBoxScene:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._lines: viser.LineSegmentsHandle | None = None
+        self._carry: Carry | None = None
 
     def render(self, old: State | None, new: State) -> None:
-        if old is None or old.session.result is not new.session.result or old.robot != new.robot:
+        if old is None or self._carry is not new.carry or old.robot != new.robot:
             self._build(new)
         if self._lines is not None and self._lines.visible != _shown(new):
             self._lines.visible = _shown(new)
@@ -28,10 +30,10 @@ class WristBoxScene:
     def _build(self, state: State) -> None:
         if self._lines is not None:
             self._lines.remove()
-        self._lines, replay = None, state.replay
-        if replay is None or replay.plan.space is None:
+        self._lines, self._carry = None, state.carry
+        if self._carry is None or self._carry.space is None:
             return
-        space = replay.plan.space
+        space = self._carry.space
         sides = np.array([(space.wrist_box[a], space.wrist_box[b]) for a, b in TOUCHING])
         self._lines = self._server.scene.add_line_segments(
             NAME.format(link=space.wrist_box_link), scaled(sides), colors=palette.BLUE, thickness=2.0, thickness_units="screen"

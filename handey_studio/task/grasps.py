@@ -1,0 +1,185 @@
+"""The first two tests of an option: the hand angles that are legal at both ends, and the way in (Handey 1987 §5.1, §5.2)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Ledger, Posture, Value, frozen_array
+from handey_studio.geometry.transforms import inverse
+from handey_studio.grasping import (
+    HAND_MARGIN_M,
+    BumpRun,
+    GraspGroup,
+    GraspPlane,
+    LegalRotations,
+    contact_area,
+    fill_grasp_plane,
+    hand_in_plane,
+    opening_around,
+    plan_approach,
+    tilt,
+)
+from handey_studio.task.options import Option
+from handey_studio.task.plan import GraspChoice
+from handey_studio.world import FINGERS, Hand
+from handey_studio.world.collision import collision_model
+
+STANDOFFS_M = (0.08, 0.05)  # the approach starts with the fingertips this far in front of the grasp point
+CLOSED_MARGIN_M = 1e-4  # fingers that close on a part keep this from all else; what stands beside the part is that near
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp(Value):
+    """A grasp that can be approached: hand poses at both ends and the way in. `approach_hands` (k, 4, 4) ends at the pickup."""
+
+    option: Option
+    choice: GraspChoice
+    approach: BumpRun
+    approach_hands: NDArray
+    retreat_hands: NDArray
+    entry: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "approach_hands", frozen_array(self.approach_hands))
+        object.__setattr__(self, "retreat_hands", frozen_array(self.retreat_hands))
+
+    @property
+    def T_world_hand_pickup(self) -> NDArray:
+        return self.approach_hands[-1]
+
+    @property
+    def T_world_hand_putdown(self) -> NDArray:
+        return self.retreat_hands[0]
+
+
+def hand_posture(option: Option, T_world_hand: NDArray, opening: float, end: int) -> Posture:
+    """The hand alone at one end (0 pickup, 1 putdown) of an option."""
+    T_world_part = option.T_world_start if end == 0 else option.goal.T_world_goal
+    return Posture((), plain(T_world_hand), opening, option.goal.instance.name, plain(T_world_part))
+
+
+def plain(T: NDArray) -> tuple[float, ...]:
+    return tuple(np.asarray(T, dtype=float).ravel().tolist())
+
+
+def fall_illegal(option: Option, rotations: LegalRotations, entry: int, ledger: Ledger) -> None:
+    """Say which end forbids the group: pickup, putdown, or each end some angles but never both the same."""
+    legal = rotations.legal_at
+    if (rotations.areas < rotations.min_area).all():
+        ledger.fall(entry, "the fingers overlap the face too little at every angle", value=float(rotations.areas.max()),
+                    limit=rotations.min_area, unit="m²")  # fmt: skip
+        return
+    if not legal.any(axis=0).all():
+        end = 0 if not legal[:, 0].any() else 1
+        k = int(np.argmax(np.where(rotations.areas >= rotations.min_area, rotations.clearances[:, end], -np.inf)))
+        reason = f"the hand collides at every angle at the {('pickup', 'putdown')[end]}"
+    else:
+        k = int(np.argmax(np.where(rotations.areas >= rotations.min_area, rotations.clearances.min(axis=1), -np.inf)))
+        end = int(np.argmin(rotations.clearances[k]))
+        reason = "no hand angle is legal at pickup and putdown together"
+    T_world_hand = (option.pickup, option.putdown)[end].hand_pose(option.group, float(rotations.angles[k]))
+    posture = hand_posture(option, T_world_hand, option.opening, end)
+    ledger.fall(entry, reason, value=float(rotations.clearances[k, end]), limit=HAND_MARGIN_M, unit="m",
+                bodies=rotations.blockers[k][end], posture=posture)  # fmt: skip
+
+
+def grasp_plane_of(option: Option) -> GraspPlane:
+    """The grasp plane at the pickup, filled with everything that the world believes."""
+    group, hand = option.group, option.goal.at_start.robot.hand
+    T_world_plane = option.T_world_start @ group.grasp_class.T_part_plane
+    return fill_grasp_plane(option.goal.at_start, T_world_plane, group.point, hand, option.opening)
+
+
+def grasps_at(option: Option, rotations: LegalRotations, plane: GraspPlane, angle: float, entry: int, ledger: Ledger) -> list[Grasp]:
+    """The grasps that the bump-line planner reaches from one hand angle, one for each way round of the hand; none if it falls."""
+    hand, group = option.goal.at_start.robot.hand, option.group
+    run = approach_run(plane, group, hand, angle)
+    T_part_plane = group.grasp_class.T_part_plane
+    final = run.path[-1]
+    last = option.T_world_start @ T_part_plane @ hand_in_plane(final[:2], final[2], 1)
+    if run.status != "reached":
+        reason = {"stuck": "the approach got stuck", "iterations": "the approach ran out of steps"}
+        ledger.fall(entry, reason.get(run.status, "the way in starts blocked"), value=run.distance, limit=run.threshold, unit="m",
+                    posture=hand_posture(option, last, option.opening, 0))  # fmt: skip
+        return []
+    area = contact_area(group.grasp_class, hand, final[:2], final[2])
+    if area < hand.min_contact_area:
+        ledger.fall(entry, "the fingers overlap the face too little after the approach", value=area, limit=hand.min_contact_area,
+                    unit="m²", posture=hand_posture(option, last, option.opening, 0))  # fmt: skip
+        return []
+    if _blocked(option, last, option.goal.T_world_goal @ T_part_plane @ _straight_back(final, 1)[0], entry, ledger):
+        return []
+    found = []
+    for side in (1, -1):
+        in_plane = np.array([hand_in_plane(pose[:2], pose[2], side) for pose in run.path])
+        hands = option.T_world_start @ T_part_plane @ in_plane
+        retreat = option.goal.T_world_goal @ T_part_plane @ _straight_back(final, side)
+        choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), area)
+        turned = ledger.add("hand", "one way round" if side > 0 else "the other way round", parent=entry)
+        found.append(Grasp(option, choice, run, hands, retreat, turned))
+    return found
+
+
+def approach_run(plane: GraspPlane, group: GraspGroup, hand: Hand, angle: float) -> BumpRun:
+    """The bump-line planner's run with the hand at first at an angle, from as far out as the way in is free."""
+    along = np.array([np.cos(angle), np.sin(angle)])
+    runs = []
+    for standoff in STANDOFFS_M:
+        start = np.append(group.point - (standoff + group.depth) * along, angle)
+        runs.append(plan_approach(plane, hand, start, group.point))
+        if runs[-1].status == "reached":
+            return runs[-1]
+    return min(runs, key=lambda run: run.distance)
+
+
+def finger_pairs(name: str) -> tuple[tuple[str, str], ...]:
+    """The fingers may touch the part that they take."""
+    return tuple((finger, name) for finger in FINGERS)
+
+
+def _blocked(option: Option, T_world_pickup: NDArray, T_world_putdown: NDArray, entry: int, ledger: Ledger) -> bool:
+    """Whether the hand meets something at either end where the approach has led it, open around the part or closed on it."""
+    goal, width = option.goal, option.group.grasp_class.width
+    touching = finger_pairs(goal.instance.name)
+    for end, (where, world, T) in enumerate((("pickup", goal.at_start, T_world_pickup), ("putdown", goal.at_goal, T_world_putdown))):
+        for how, apart, pairs, margin in (("open", option.opening, (), HAND_MARGIN_M), ("closed", width, touching, CLOSED_MARGIN_M)):
+            clearance = collision_model(world).hand_contact(T, apart, allowed=pairs)
+            if clearance.distance < margin:
+                ledger.fall(entry, f"the {how} hand collides at the {where}", value=clearance.distance, limit=margin, unit="m",
+                            bodies=clearance.bodies, posture=hand_posture(option, T, apart, end))  # fmt: skip
+                return True
+    return False
+
+
+def _straight_back(final: NDArray, side: int) -> NDArray:
+    """T_plane_hand (k, 4, 4) of the retreat: straight back along the fingers."""
+    along = np.array([np.cos(final[2]), np.sin(final[2])])
+    return np.array([hand_in_plane(final[:2] - back * along, final[2], side) for back in np.linspace(0.0, STANDOFFS_M[0], 17)])
+
+
+def _choice(
+    option: Option, rotations: LegalRotations, final: NDArray, T_part_hand: NDArray, tilts: tuple[float, float], area: float
+) -> GraspChoice:
+    group, hand = option.group, option.goal.at_start.robot.hand
+    T_part_plane = group.grasp_class.T_part_plane
+    return GraspChoice(
+        name=group.grasp_class.name,
+        faces=group.grasp_class.faces,
+        group=group.name,
+        T_hand_part=inverse(T_part_hand),
+        T_part_plane=T_part_plane,
+        edge_part=_in_part(T_part_plane, group.edge),
+        contact_part=_in_part(T_part_plane, group.grasp_class.outline),
+        angle=float(final[2]),
+        ranges=np.array(rotations.ranges()).reshape(-1, 2),
+        tilts=tilts,
+        width=group.grasp_class.width,
+        opening=opening_around(hand, group.grasp_class.width),
+        contact_area=area,
+        joint_margin=0.0,
+    )
+
+
+def _in_part(T_part_plane: NDArray, points: NDArray) -> NDArray:
+    return points @ T_part_plane[:3, 1:3].T + T_part_plane[:3, 3]

@@ -1,0 +1,264 @@
+"""The options of a MOVE as one search: the answer to what Handey 1987 §7 calls its most significant lesson.
+
+Instance × place × symmetry × grasp group × hand angle × way round × arm branches, and for a part that is put down on the way all of it
+again: a tree that is opened best first, by how good an option is and what a plan from it should still cost to find (`stages`).
+Cheap tests come first. Nothing is tested twice, and an arm motion that is not found postpones the options that are nearly the same.
+Every option that falls stays in the ledger; so do those that were not looked at, as a number.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from heapq import heappop, heappush
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Ledger, Progress, Share
+from handey_studio.grasping import LegalRotations, legal_rotations
+from handey_studio.task.carrying import Carried, Kept, Start, join, worst
+from handey_studio.task.detours import detours
+from handey_studio.task.ends import PICKUP, PUTDOWN, End, pickup_end, putdown_end, reachable
+from handey_studio.task.grasps import Grasp, fall_illegal, grasp_plane_of, grasps_at
+from handey_studio.task.options import Goal, Option, options_of
+from handey_studio.task.plan import Carry, MovePlan, Step
+from handey_studio.task.stages import APPROACH, DETOUR, PATHS, REACH, ROTATIONS, STAGES, STRAIGHT, left
+
+ANGLES = 4  # hand angles of one group that are looked at, the most vertical first
+WORTH_S = 0.3  # what a radian less of tilt is worth in time to plan
+TURN_COST = 0.3  # a radian of the joint that turns most counts as so many radians of tilt
+REGRASP_S = 2.0  # each time that the part is put down on the way
+DETOUR_COST = 1.0  # [rad] each further place to put it down is worth that much less
+ALIKE_RAD = 0.35  # configurations that differ by less than this in every joint are neighbours
+NEIGHBOUR_S = 1.0  # for each neighbour whose arm motion was not found
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """`effort` [s on an ordinary machine, by the constants of `stages`] is the work after which the search gives up; `improve` is how
+    many more whole plans are looked at once there is one; `regrasps` how often the part may be put down on the way."""
+
+    effort: float = 40.0
+    improve: int = 0
+    regrasps: int = 2
+
+
+class Route(NamedTuple):
+    """The places that the part goes to one after the other, and the carries that are planned so far."""
+
+    goals: tuple[Goal, ...]
+    done: tuple[Carried, ...] = ()
+
+    @property
+    def goal(self) -> Goal:
+        """Where the next carry goes."""
+        return self.goals[len(self.done)]
+
+
+class Node(NamedTuple):
+    """An option as far as it was tested: what it is, its cost [rad of tilt], the ledger's entry it belongs to, and how many neighbours'
+    arm motions were not found."""
+
+    stage: int
+    route: Route
+    what: Any
+    cost: float
+    entry: int
+    postponed: int = 0
+
+
+@dataclass(eq=False)
+class OptionSearch:
+    """One search. `run` gives the plans as they are found."""
+
+    start: Start
+    ledger: Ledger
+    progress: Progress
+    rng: np.random.Generator
+    options: SearchOptions
+    spent: float = 0.0
+    _heap: list[tuple[float, int, Node]] = field(default_factory=list)
+    _pushed: int = 0
+    _kept: Kept = field(default_factory=dict)
+    _ends: dict[tuple, End | None] = field(default_factory=dict)
+    _lost: list[NDArray] = field(default_factory=list)
+
+    @property
+    def waiting(self) -> list[Node]:
+        """The options that were not looked at."""
+        return [node for _, _, node in self._heap]
+
+    def run(self, goals: list[Goal]) -> Iterator[MovePlan]:
+        """Plans, the first one soon. Ends when nothing is left, when the effort is spent, or on cancel."""
+        for goal in goals:
+            self._begin(Route((goal,)))
+            self._detour(goal, detours(goal, self.options.regrasps, self.ledger), 0)
+        while self._heap and self.spent < self.options.effort and not self.progress.cancelled:
+            node = heappop(self._heap)[2]
+            postponed = self._neighbours(node) if node.stage == PATHS else 0
+            if postponed > node.postponed:
+                self._push(node._replace(postponed=postponed))
+                continue
+            self.spent += STAGES[node.stage].seconds
+            self._tell(node)
+            plan = TESTS[node.stage](self, node)
+            if plan is not None:
+                yield plan
+
+    def _push(self, node: Node) -> None:
+        later = len(node.route.goals) - len(node.route.done) - 1
+        expected = WORTH_S * node.cost + NEIGHBOUR_S * node.postponed + left(node.stage) + later * (left(ROTATIONS) + REGRASP_S)
+        heappush(self._heap, (expected, self._pushed, node))
+        self._pushed += 1
+
+    def _detour(self, goal: Goal, ways: Iterator[tuple[Goal, ...]], count: int) -> None:
+        """One node stands for all the ways on which the part is put down; the next of them is worked out when it is its turn."""
+        self._push(Node(DETOUR, Route((goal, goal)), (ways, count), count * DETOUR_COST, goal.entry))
+
+    def _open_detour(self, node: Node) -> None:
+        ways, count = node.what
+        goals = next(ways, None)
+        if goals is not None:
+            self._begin(Route(goals))
+            self._detour(node.route.goal, ways, count + 1)
+
+    def _tell(self, node: Node) -> None:
+        what = {
+            DETOUR: lambda: "a way on which the part is put down and taken anew",
+            ROTATIONS: lambda: f"hand angles of {node.what.name}",
+            APPROACH: lambda: f"approach to {node.what[0].name}",
+            REACH: lambda: f"reach for {node.what.option.name}",
+            STRAIGHT: lambda: f"straight motions for {node.what[0].option.name}",
+            PATHS: lambda: f"arm motions for {node.what[0].option.name}",
+        }[node.stage]()
+        self.progress.report(min(self.spent / self.options.effort, 0.99), f"{what}; {len(self._heap)} more options wait")
+
+    def _begin(self, route: Route, paid: float = 0.0) -> None:
+        """All options of a route's next carry."""
+        for option in options_of(route.goal, self.ledger):
+            self._push(Node(ROTATIONS, route, option, paid + option.cost, route.goal.entry))
+
+    def _neighbours(self, node: Node) -> int:
+        """How many options nearly like this one had an arm motion that was not found."""
+        key = _joint_key(node)
+        return sum(len(key) == len(lost) and np.abs(key - lost).max() < ALIKE_RAD for lost in self._lost)
+
+    def _rotations(self, node: Node) -> None:
+        option: Option = node.what
+        entry = self.ledger.add("grasp group", option.name, parent=node.entry)
+        rotations = legal_rotations(option.group, option.pickup, option.putdown)
+        if not rotations.legal.any():
+            fall_illegal(option, rotations, entry, self.ledger)
+            return
+        plane: list = []  # filled once, by the first angle that is looked at
+        best = rotations.best(ANGLES)
+        for angle in best:
+            extra = _tilt_at(rotations, angle) - _tilt_at(rotations, best[0])
+            self._push(Node(APPROACH, node.route, (option, rotations, angle, plane), node.cost + extra, entry))
+
+    def _approach(self, node: Node) -> None:
+        option, rotations, angle, plane = node.what
+        if not plane:
+            plane.append(grasp_plane_of(option))
+        entry = self.ledger.add("approach", f"hand at {np.rad2deg(angle - option.group.angle):+.0f}°", parent=node.entry)
+        for grasp in grasps_at(option, rotations, plane[0], angle, entry, self.ledger):
+            self._push(Node(REACH, node.route, grasp, node.cost, grasp.entry))
+
+    def _reach(self, node: Node) -> None:
+        grasp: Grasp = node.what
+        q = self._q(node.route)
+        pickups = reachable(grasp, PICKUP, q, self.ledger)
+        putdowns = reachable(grasp, PUTDOWN, q, self.ledger) if pickups else []
+        if not pickups or not putdowns:
+            self.ledger.fall(grasp.entry, f"no arm configuration is free at the {PUTDOWN if pickups else PICKUP}")
+            return
+        held = grasp.option.goal.at_start.robot.held_index
+        for a in pickups:
+            for b in putdowns:
+                turns = float(np.abs(a - q).max() + np.abs(b - a).max() + np.abs(b - a)[held].sum())
+                self._push(Node(STRAIGHT, node.route, (grasp, a, b), node.cost + TURN_COST * turns, node.entry))
+
+    def _straight(self, node: Node) -> None:
+        grasp, a, b = node.what
+        pickup = self._end(grasp, PICKUP, a)
+        putdown = self._end(grasp, PUTDOWN, b) if pickup is not None else None
+        if pickup is not None and putdown is not None:
+            self._push(Node(PATHS, node.route, (grasp, pickup, putdown), node.cost, node.entry))
+
+    def _end(self, grasp: Grasp, where: str, q: NDArray) -> End | None:
+        key = (grasp, where, q.tobytes())
+        if key not in self._ends:
+            self._ends[key] = (pickup_end if where == PICKUP else putdown_end)(grasp, q, self.ledger)
+        return self._ends[key]
+
+    def _paths(self, node: Node) -> MovePlan | None:
+        grasp, pickup, putdown = node.what
+        route = node.route
+        last = len(route.done) == len(route.goals) - 1
+        start = replace(self.start, q=self._q(route), opening=route.done[-1].opening_end if route.done else self.start.opening)
+        entry = self.ledger.add("arm", f"branches {_degrees(pickup.q)} and {_degrees(putdown.q)}", parent=node.entry)
+        share = Share(self.progress, min(self.spent / self.options.effort, 0.99), 1.0)
+        carried = join(grasp, pickup, putdown, start, last, self._kept, entry, self.ledger, share, self.rng)
+        if carried is None:
+            self._lost.append(_joint_key(node))
+            return None
+        done = route._replace(done=(*route.done, carried))
+        if last:
+            return _whole(grasp.option.goal.instance.name, done.done)
+        self._begin(done, node.cost)
+        return None
+
+    def _q(self, route: Route) -> NDArray:
+        return route.done[-1].q_end if route.done else self.start.q
+
+
+TESTS: dict[int, Callable[[OptionSearch, Node], MovePlan | None]] = {
+    DETOUR: OptionSearch._open_detour,
+    ROTATIONS: OptionSearch._rotations,
+    APPROACH: OptionSearch._approach,
+    REACH: OptionSearch._reach,
+    STRAIGHT: OptionSearch._straight,
+    PATHS: OptionSearch._paths,
+}
+
+
+def _tilt_at(rotations: LegalRotations, angle: float) -> float:
+    return float(rotations.tilts.sum(axis=1)[np.argmin(np.abs(rotations.angles - angle))])
+
+
+def _joint_key(node: Node) -> NDArray:
+    _, pickup, putdown = node.what
+    return np.concatenate([pickup.q, putdown.q])
+
+
+def _degrees(q: NDArray) -> str:
+    return " ".join(f"{angle:.0f}°" for angle in np.rad2deg(q))
+
+
+def _whole(part: str, carries: tuple[Carried, ...]) -> MovePlan:
+    """One plan of all carries."""
+    steps: list[Step] = []
+    found: list[Carry] = []
+    for carried in carries:
+        found.append(replace(carried.carry, first_step=len(steps)))
+        steps += carried.steps
+    return MovePlan(part, tuple(found), tuple(steps), worst([carried.certificate for carried in carries]))
+
+
+GAVE_WAY = {
+    "grasp group": "nothing works at any of its hand angles",
+    "approach": "neither way round works",
+    "hand": "no pair of arm configurations works",
+}
+
+
+def settle(ledger: Ledger, waiting: set[int]) -> None:
+    """Options below which everything fell have fallen themselves; those in `waiting`, with something untested below, stand."""
+    standing, below = set(waiting), {entry.parent for entry in ledger.entries}
+    for entry in reversed(ledger.entries):
+        if entry.reason is not None or entry.parent is None or entry.stage not in (*GAVE_WAY, "arm"):
+            continue
+        if entry.stage == "arm" or entry.id in standing or entry.id not in below:
+            standing.add(entry.parent)
+        else:
+            ledger.fall(entry.id, GAVE_WAY[entry.stage])
