@@ -16,10 +16,11 @@ from handey_studio.base.files import replace_file
 from handey_studio.session.checks import check_name, check_session
 from handey_studio.session.coding import from_plain, to_plain
 from handey_studio.session.session import Session
+from handey_studio.session.upgrade import upgraded
 from handey_studio.world import Library
 
 SCHEMA = "handey/session/"
-VERSION = 1
+VERSION = 2
 SUFFIX = ".handey"
 MAX_FILE_BYTES = 64_000_000
 MAX_CONTENT_BYTES = 256_000_000
@@ -42,7 +43,7 @@ def session_from_bytes(data: bytes, source: str) -> Session:
     try:
         plain = _decoded(_inflated(data))
         check_version(plain)
-        session = from_plain({key: value for key, value in plain.items() if key != "schema"}, Session)
+        session = from_plain(upgraded({key: value for key, value in plain.items() if key != "schema"}), Session)
         check_session(session)
     except BadInput as error:
         raise BadInput(f'session "{source}" cannot be opened: {error}') from None

@@ -5,6 +5,7 @@ from handey_studio.task.destination import format_pose, goal_poses, parse_destin
 from handey_studio.task.move import MoveOptions, check_command, plan_move
 from handey_studio.task.plan import GraspChoice, MoveCommand, MovePlan, MoveResult, Step
 from handey_studio.task.run import Station, execute_in, plan_in, run_move, sense
+from handey_studio.task.search import SearchOptions
 from handey_studio.task.sense import Scene, believed_world
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "MovePlan",
     "MoveResult",
     "Scene",
+    "SearchOptions",
     "Start",
     "Station",
     "Step",

@@ -1,6 +1,7 @@
 """Ways to the goal on which the part is put down and taken anew (Handey 1987 §5.3): which placements, and where they fit."""
 
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,11 @@ from handey_studio.grasping import (
 from handey_studio.task.destination import format_pose
 from handey_studio.task.options import Goal, check_goal
 
-PATCHES = 3  # places that are tried for one sequence of placements
+PATCHES = 3  # places that are tried for one series of placements
+MOST_SEQUENCES = 300  # that are looked through for another series of placements: most differ in their grasps only
+
+Series = tuple[tuple[int, ...], RegraspSequence]
+"""Rows of the table, one for each time that the part is put down, and the cheapest sequence through them."""
 
 
 def detours(goal: Goal, most: int, ledger: Ledger) -> Iterator[tuple[Goal, ...]]:
@@ -51,9 +56,7 @@ def _costs(table: GraspPlacementTable, end: GraspEnd) -> NDArray:
     return np.where(legal_at(table, end), tilts_at(table, end.T_world_part), np.inf)
 
 
-def _by_placements(
-    table: GraspPlacementTable, start: NDArray, end: NDArray, most: int
-) -> Iterator[tuple[tuple[int, ...], RegraspSequence]]:
+def _by_placements(table: GraspPlacementTable, start: NDArray, end: NDArray, most: int) -> Iterator[Series]:
     """The cheapest sequence of each series of placements; with one regrasp first, then those with more."""
     seen: set[tuple[int, ...]] = set()
 
@@ -61,7 +64,7 @@ def _by_placements(
         return transfer.source < 0 and (int(table.placement_of[transfer.target]),) in seen and transfer.target >= 0
 
     for regrasps in range(1, most + 1):
-        for sequence in sequences(table, start, end, regrasps, regrasps, ruled_out=known):
+        for sequence in islice(sequences(table, start, end, regrasps, regrasps, ruled_out=known), MOST_SEQUENCES):
             rows = tuple(transfer.target for transfer in sequence.transfers[:-1])
             places = tuple(int(table.placement_of[row]) for row in rows)
             if places not in seen:

@@ -34,7 +34,7 @@ def robot(tmp_path_factory):
 
 
 def test_the_grasp_plane_shows_world_up_up_and_the_hand_where_it_ends(session, robot):
-    run = session.results[0].plan.approach
+    run = session.results[0].plan.carries[0].approach
     svg = grasp_plane_svg(run, robot.hand)
     points = [tuple(map(float, p.split(","))) for p in re.search(r'<polyline points="([^"]+)"', svg)[1].split()]
     assert len(points) == len(run.path) and points[0][1] < points[-1][1], "the hand comes down"
@@ -43,7 +43,7 @@ def test_the_grasp_plane_shows_world_up_up_and_the_hand_where_it_ends(session, r
 
 
 def test_filled_cells_are_drawn_where_they_are(session, robot):
-    run = session.results[0].plan.approach
+    run = session.results[0].plan.carries[0].approach
     svg = grasp_plane_svg(run, robot.hand)
     a, b, c, d, e, f = map(float, re.search(r"matrix\(([^)]+)\)", svg)[1].split())
     goal = re.search(r'<circle cx="([\d.-]+)" cy="([\d.-]+)"', svg)
@@ -102,7 +102,7 @@ def test_labels_lead_back_to_their_words():
 
 
 def test_grasp_facts_speak_of_classes_and_angles(session):
-    facts = dict(grasp_facts(session.results[0].plan))
+    facts = dict(grasp_facts(session.results[0].plan.carries[0].grasp))
     assert facts["Legal angles"] == "69° to 109°" and facts["Fingers"] == "40.0 mm held, 60 mm open"
 
 

@@ -12,7 +12,7 @@ from handey_studio.localization import DataEdge, Hypothesis, LocateResult
 from handey_studio.motion import Certificate
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session import Session, new_session
-from handey_studio.task.plan import GraspChoice, MoveCommand, MovePlan, MoveResult, Step
+from handey_studio.task.plan import Carry, GraspChoice, MoveCommand, MovePlan, MoveResult, Step
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, PlacedPart, Robot, arm_of
 
@@ -44,7 +44,7 @@ def hand_made_plan(robot: Robot, part: str = "l_block#1") -> MovePlan:
         line(robot, "retreat", there, robot.home, (0.1, 0.1)),
     )
     certificate = Certificate(0.004, (3, 0.5), ("finger_left", "depth map"), True, 0.001)
-    return MovePlan(part, T_START, goal, hand_made_grasp(T_hand_part), steps, certificate, hand_made_approach())
+    return MovePlan(part, (Carry(T_START, goal, hand_made_grasp(T_hand_part), hand_made_approach()),), steps, certificate)
 
 
 def hand_made_grasp(T_hand_part) -> GraspChoice:

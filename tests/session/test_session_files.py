@@ -59,7 +59,7 @@ def test_a_session_without_a_scan_is_readable_text(fresh):
 
 def test_the_grasp_plane_comes_back_cell_by_cell(full):
     back = session_from_bytes(session_to_bytes(full), "x").results[0].plan
-    np.testing.assert_array_equal(back.approach.plane.fingers, full.results[0].plan.approach.plane.fingers)
+    np.testing.assert_array_equal(back.carries[0].approach.plane.fingers, full.results[0].plan.carries[0].approach.plane.fingers)
 
 
 DTYPES = st.sampled_from(["<f8", "<f4", "<i8", "<i4", "|u1", "|b1"])
@@ -123,13 +123,13 @@ def test_hostile_json_never_escapes_as_anything_but_a_sentence(full, data):
 
 
 def test_a_newer_version_is_refused_clearly(fresh):
-    sentence = refused(plain_of(fresh) | {"schema": "handey/session/2"})
-    assert "format 2" in sentence and "up to 1" in sentence and "update" in sentence
+    sentence = refused(plain_of(fresh) | {"schema": "handey/session/3"})
+    assert "format 3" in sentence and "up to 2" in sentence and "update" in sentence
 
 
 @pytest.mark.parametrize("schema", [None, "", "handey/session/", "handey/session/one", "handey/move/1", 1, "handey/session/0"])
 def test_what_is_no_session_is_refused(fresh, schema):
-    assert "handey/session/1" in refused(plain_of(fresh) | {"schema": schema})
+    assert "handey/session/2" in refused(plain_of(fresh) | {"schema": schema})
 
 
 def test_a_skewed_frame_is_refused_by_its_path(full):
@@ -231,3 +231,15 @@ def test_small_arrays_are_readable_and_large_ones_are_bytes():
     assert plain_array(np.eye(4)).keys() == {"array"}
     assert plain_array(np.zeros((20, 20))).keys() == {"dtype", "shape", "base64"}
     assert plain_array(np.array([np.nan])).keys() == {"dtype", "shape", "base64"}
+
+
+def test_a_session_of_the_first_format_opens_with_its_plan(full):
+    """There a plan was one carry, whose values stood in the plan itself."""
+    plain = plain_of(full) | {"schema": "handey/session/1"}
+    for result in plain["results"]:
+        plan = result["plan"]
+        if plan is not None:
+            (carry,) = plan.pop("carries")
+            plan |= {key: carry[key] for key in ("T_world_part_start", "T_world_part_goal", "grasp", "approach", "space")} | {"regrasps": 0}
+    back = session_from_bytes(json.dumps(plain).encode(), "old")
+    assert session_to_bytes(back) == session_to_bytes(full)
