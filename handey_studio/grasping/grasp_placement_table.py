@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.transforms import inverse
-from handey_studio.grasping.classes import GraspGroup, contact_area, grasp_groups, hand_in_plane, opening_around
+from handey_studio.grasping.classes import contact_area, hand_in_plane, opening_around
+from handey_studio.grasping.groups import GraspGroup, grasp_groups
 from handey_studio.grasping.placements import Placement, PlacementOptions, stable_placements
 from handey_studio.grasping.rotations import HAND_MARGIN_M, GraspEnd, tilt
 from handey_studio.world import Hand, Part

@@ -64,24 +64,14 @@ def plain(T: NDArray) -> tuple[float, ...]:
 
 
 def fall_illegal(option: Option, rotations: LegalRotations, entry: int, ledger: Ledger) -> None:
-    """Say which end forbids the group: pickup, putdown, or each end some angles but never both the same."""
-    legal = rotations.legal_at
-    if (rotations.areas < rotations.min_area).all():
-        ledger.fall(entry, "the fingers overlap the face too little at every angle", value=float(rotations.areas.max()),
-                    limit=rotations.min_area, unit="m²")  # fmt: skip
+    """Say what forbids the group: too little contact, the part itself, one end, or each end some angles but never both the same."""
+    fault = rotations.fault()
+    if fault is None:
         return
-    if not legal.any(axis=0).all():
-        end = 0 if not legal[:, 0].any() else 1
-        k = int(np.argmax(np.where(rotations.areas >= rotations.min_area, rotations.clearances[:, end], -np.inf)))
-        reason = f"the hand collides at every angle at the {('pickup', 'putdown')[end]}"
-    else:
-        k = int(np.argmax(np.where(rotations.areas >= rotations.min_area, rotations.clearances.min(axis=1), -np.inf)))
-        end = int(np.argmin(rotations.clearances[k]))
-        reason = "no hand angle is legal at pickup and putdown together"
-    T_world_hand = (option.pickup, option.putdown)[end].hand_pose(option.group, float(rotations.angles[k]))
+    end = 1 if fault.end == "putdown" else 0
+    T_world_hand = (option.pickup, option.putdown)[end].hand_pose(option.group, fault.angle)
     posture = hand_posture(option, T_world_hand, option.opening, end)
-    ledger.fall(entry, reason, value=float(rotations.clearances[k, end]), limit=HAND_MARGIN_M, unit="m",
-                bodies=rotations.blockers[k][end], posture=posture)  # fmt: skip
+    ledger.fall(entry, fault.reason, value=fault.value, limit=fault.limit, unit="rad", bodies=fault.bodies, posture=posture)
 
 
 def grasp_plane_of(option: Option) -> GraspPlane:

@@ -51,13 +51,13 @@ class Step(Value):
 class GraspChoice(Value):
     """The grasp that a plan uses: its class and approach group in words and numbers.
 
-    `T_hand_part` (4, 4) is the grasp itself. `faces` are the two grasped faces, `edge_part` (2, 3) [m] the edge that is crossed first, both
+    `T_hand_part` (4, 4) is the grasp itself. `faces` are the grasped faces, `edge_part` (2, 3) [m] the edge that is crossed first, both
     of the part; `contact_part` (k, 3) [m] the outline of where the faces face each other, in the grasp plane. `angle` and the
     legal `ranges` (m, 2) [rad] are hand angles in the grasp plane. `tilts` [rad] of the fingers from straight down at pickup and putdown.
     """
 
     name: str
-    faces: tuple[int, int]
+    faces: tuple[int, ...]
     group: str
     T_hand_part: NDArray
     T_part_plane: NDArray

@@ -147,7 +147,7 @@ class OptionSearch:
         option: Option = node.what
         entry = self.ledger.add("grasp group", option.name, parent=node.entry)
         rotations = legal_rotations(option.group, option.pickup, option.putdown)
-        if not rotations.legal.any():
+        if not rotations.legal:
             fall_illegal(option, rotations, entry, self.ledger)
             return
         plane: list = []  # filled once, by the first angle that is looked at
@@ -223,7 +223,7 @@ TESTS: dict[int, Callable[[OptionSearch, Node], MovePlan | None]] = {
 
 
 def _tilt_at(rotations: LegalRotations, angle: float) -> float:
-    return float(rotations.tilts.sum(axis=1)[np.argmin(np.abs(rotations.angles - angle))])
+    return float(rotations.tilts(np.array([angle])).sum())
 
 
 def _joint_key(node: Node) -> NDArray:

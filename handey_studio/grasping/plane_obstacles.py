@@ -1,0 +1,268 @@
+"""What is in the way of a hand that turns in the grasp plane: obstacles clipped to the hand's slabs, seen along the closing direction.
+
+Everything is told in the grasp plane's frame, which is fixed to the part. So the obstacles of the pickup and those of the putdown, carried
+back by the inverse of the part's motion (Handey 1987 §5.1, Figure 8), are the same kind of thing.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from handey_studio.geometry import HeightField
+from handey_studio.grasping.forbidden_angles import insert, polygon_ranges, stretch_ranges
+from handey_studio.world import FINGERS, Hand
+from handey_studio.world.collision_bodies import COLUMN_M, TABLE_SKIN_M, Obstacles
+
+BIN_M = 0.0005  # columns of the depth map are gathered in strips this wide, across the direction in which they go down
+STEP_M = 0.001  # and along the strips in steps this long
+
+
+class Volumes(NamedTuple):
+    """The hand's boxes as they turn in the plane: `slabs` (v, 2) [m] from where to where along the closing direction, `boxes` (v, 3) [m]
+    half the width, and from where to where back from the fingertips."""
+
+    slabs: NDArray
+    boxes: NDArray
+
+
+class Columns(NamedTuple):
+    """The depth map's columns: `tops` (ny, nx) [m] in the world, -inf where nothing stands out of the table; `T_world_range`, `cell` [m],
+    and where the columns end below."""
+
+    tops: NDArray
+    T_world_range: NDArray
+    cell: float
+    bottom: float
+
+
+def hand_volumes(hand: Hand, width: float, opening: float, margin: float, skin: float = 0.0) -> Volumes:
+    """The volumes of a hand that closes from `opening` to `width` [m], larger by `margin` [m] all around.
+
+    Where the fingers close on the part they end `skin` [m] before its surface, so that they may touch it.
+    """
+    slabs, boxes = [], []
+    for name, (lower, upper) in hand.boxes(opening).items():
+        low, high = lower[0] - margin, upper[0] + margin
+        if name in FINGERS:
+            low, high = (low, -width / 2.0 - skin) if upper[0] <= 0 else (width / 2.0 + skin, high)
+        slabs.append((low, high))
+        boxes.append((max(-lower[1], upper[1]) + margin, -upper[2] - margin, -lower[2] + margin))
+    return Volumes(np.array(slabs), np.array(boxes))
+
+
+@lru_cache(maxsize=8)
+def depth_columns(terrain: HeightField, table_z: float, ceiling: float) -> Columns:
+    """The columns of a depth map that stand out of the table, kept from world to world; no reading is solid to the ceiling."""
+    field = terrain.coarsened(max(1, round(COLUMN_M / terrain.cell)))
+    tops = np.minimum(np.where(np.isnan(field.top), np.inf, field.top + field.T_world_range[2, 3]), ceiling)
+    return Columns(np.where(tops > table_z + TABLE_SKIN_M, tops, -np.inf), np.array(field.T_world_range), float(field.cell), float(table_z))
+
+
+@njit(cache=True)
+def add_solids(
+    solids: Obstacles, skipped: int, T_world_plane: NDArray, volumes: Volumes, window: tuple[float, float], ranges: NDArray, counts: NDArray
+) -> None:
+    """Adds the angles that convex bodies forbid, to the ranges of their names; the body called `skipped` is passed over.
+
+    `T_world_plane` (4, 4) has its origin at the grasp point.
+    """
+    far = 0.0
+    for v in range(len(volumes.slabs)):
+        reach = max(-volumes.slabs[v, 0], volumes.slabs[v, 1]) ** 2 + volumes.boxes[v, 0] ** 2 + volumes.boxes[v, 2] ** 2
+        far = max(far, np.sqrt(reach))
+    for k in range(len(solids.name)):
+        first, last = solids.first[k], solids.first[k + 1]
+        if solids.name[k] == skipped or _distance(solids.corners, first, last, T_world_plane) > far:
+            continue
+        corners = _seen(T_world_plane, solids.corners, first, last)
+        for v in range(len(volumes.slabs)):
+            box = (volumes.boxes[v, 0], volumes.boxes[v, 1], volumes.boxes[v, 2])
+            if _far(corners, volumes.slabs[v], box):
+                continue
+            outline = hull(clipped(corners, volumes.slabs[v, 0], volumes.slabs[v, 1]))
+            if len(outline):
+                polygon_ranges(outline, box, window, ranges, counts, solids.name[k])
+
+
+@njit(cache=True)
+def _distance(corners: NDArray, first: int, last: int, T: NDArray) -> float:
+    """Distance [m] from a frame's origin to the box around a body."""
+    total = 0.0
+    for axis in range(3):
+        low, high = np.inf, -np.inf
+        for i in range(first, last):
+            low, high = min(low, corners[i, axis]), max(high, corners[i, axis])
+        total += max(low - T[axis, 3], T[axis, 3] - high, 0.0) ** 2
+    return np.sqrt(total)
+
+
+@njit(cache=True)
+def _seen(T: NDArray, corners: NDArray, first: int, last: int) -> NDArray:
+    """A body's corners (k, 3) in a frame."""
+    out = np.empty((last - first, 3))
+    for i in range(len(out)):
+        x, y, z = corners[first + i, 0] - T[0, 3], corners[first + i, 1] - T[1, 3], corners[first + i, 2] - T[2, 3]
+        for axis in range(3):
+            out[i, axis] = T[0, axis] * x + T[1, axis] * y + T[2, axis] * z
+    return out
+
+
+@njit(cache=True)
+def _far(corners: NDArray, slab: NDArray, box: tuple[float, float, float]) -> bool:
+    """Whether a body's bounding box lies beside the slab or farther from the point than the rectangle reaches."""
+    gaps = 0.0
+    for axis in range(3):
+        low, high = np.inf, -np.inf
+        for i in range(len(corners)):
+            low, high = min(low, corners[i, axis]), max(high, corners[i, axis])
+        if axis == 0:
+            if low > slab[1] or high < slab[0]:
+                return True
+        else:
+            gaps += max(low, -high, 0.0) ** 2
+    return gaps > box[0] ** 2 + box[2] ** 2
+
+
+@njit(cache=True)
+def clipped(corners: NDArray, low: float, high: float) -> NDArray:
+    """Points (n, 2) [m] in y, z whose hull is what a convex body of corners (k, 3) has in the slab low ≤ x ≤ high."""
+    k = len(corners)
+    out = np.empty((k * k, 2))
+    n = 0
+    for i in range(k):
+        x = corners[i, 0]
+        if low <= x <= high:
+            out[n] = corners[i, 1:]
+            n += 1
+        for j in range(i):
+            for wall in (low, high):
+                if (x - wall) * (corners[j, 0] - wall) < 0.0:
+                    share = (wall - x) / (corners[j, 0] - x)
+                    out[n] = corners[i, 1:] + share * (corners[j, 1:] - corners[i, 1:])
+                    n += 1
+    return out[:n]
+
+
+@njit(cache=True)
+def hull(points: NDArray) -> NDArray:
+    """Corners (m, 2) of the convex hull of points (n, 2), counter-clockwise; two for points on a line, one for one point."""
+    n = len(points)
+    out = np.empty((n, 2))
+    if n == 0:
+        return out
+    start = 0
+    for i in range(n):
+        if points[i, 0] < points[start, 0] or (points[i, 0] == points[start, 0] and points[i, 1] < points[start, 1]):
+            start = i
+    here, m = start, 0
+    while m < n:
+        out[m] = points[here]
+        m += 1
+        best, far = -1, 0.0
+        for i in range(n):
+            u, v = points[i] - points[here], points[best] - points[here]
+            away = u[0] * u[0] + u[1] * u[1]
+            if away < 1e-20:
+                continue
+            turn = v[0] * u[1] - v[1] * u[0]
+            if best < 0 or turn < -1e-18 or (turn <= 1e-18 and away > far):
+                best, far = i, away
+        gone = points[best] - points[start]
+        if best < 0 or gone[0] * gone[0] + gone[1] * gone[1] < 1e-20:
+            break
+        here = best
+    return out[:m]
+
+
+@njit(cache=True)
+def add_columns(
+    columns: Columns, T_world_plane: NDArray, volumes: Volumes, window: tuple[float, float], ranges: NDArray, counts: NDArray, body: int
+) -> None:
+    """Adds the angles that the depth map's columns forbid: solid all the way down (§5.2's rays), each with its square of the map.
+
+    The plane is ruled in strips that run the way the columns do; what the columns fill of a strip is taken for a stretch as wide as it.
+    """
+    for v in range(len(volumes.slabs)):
+        filled, across, up = _filled(columns, T_world_plane, volumes.slabs[v], volumes.boxes[v])
+        half = BIN_M / 2.0
+        box = (volumes.boxes[v, 0] + half, volumes.boxes[v, 1] - half, volumes.boxes[v, 2] + half)
+        reach = -0.5 * BIN_M * len(filled)
+        found = np.empty((6, 2))
+        for i in range(len(filled)):
+            h, depth, start = reach + (i + 0.5) * BIN_M, 0, -1
+            for k in range(filled.shape[1]):
+                before = depth
+                depth += filled[i, k]
+                if before == 0 and depth > 0:
+                    start = k
+                if before > 0 and depth == 0:
+                    a, b = reach + start * STEP_M - half, reach + k * STEP_M + half
+                    y, z = h * across[0], h * across[1]
+                    n = stretch_ranges(y + a * up[0], z + a * up[1], y + b * up[0], z + b * up[1], box, found)
+                    for f in range(n):
+                        insert(found[f, 0], found[f, 1], window, ranges, counts, body)
+
+
+@njit(cache=True)
+def _filled(columns: Columns, T: NDArray, slab: NDArray, box: NDArray) -> tuple[NDArray, tuple[float, float], tuple[float, float]]:
+    """How the number of columns over a step changes along each strip (strips, steps + 1) of the square around the point; the directions, in
+    y and z, across the strips and up along them."""
+    steep = np.sqrt(T[2, 1] ** 2 + T[2, 2] ** 2)
+    up = (T[2, 1] / steep, T[2, 2] / steep) if steep > 1e-9 else (0.0, 1.0)
+    across = (up[1], -up[0])
+    strips = 2 * int(np.ceil((np.sqrt(box[0] ** 2 + box[2] ** 2) + BIN_M) / BIN_M))
+    reach = 0.5 * BIN_M * strips
+    filled = np.zeros((strips, int(np.ceil(2.0 * reach / STEP_M)) + 2), np.int32)
+    side, rise = across[0] * T[:3, 1] + across[1] * T[:3, 2], up[0] * T[:3, 1] + up[1] * T[:3, 2]
+    feet = _footprint(columns, T[:, 0]), _footprint(columns, side), _footprint(columns, rise)
+    far = np.sqrt(reach**2 + max(-slab[0], slab[1]) ** 2) + columns.cell
+    rows, cols = _near(columns, T[:3, 3], far)
+    R, cell = columns.T_world_range, columns.cell
+    for j in range(rows[0], rows[1]):
+        for i in range(cols[0], cols[1]):
+            top = columns.tops[j, i] - T[2, 3]
+            if top < -far:
+                continue
+            dx = R[0, 0] * (i + 0.5) * cell + R[0, 1] * (j + 0.5) * cell + R[0, 3] - T[0, 3]
+            dy = R[1, 0] * (i + 0.5) * cell + R[1, 1] * (j + 0.5) * cell + R[1, 3] - T[1, 3]
+            x, h, s = dx * T[0, 0] + dy * T[1, 0] + top * T[2, 0], dx * side[0] + dy * side[1], dx * rise[0] + dy * rise[1] + top * rise[2]
+            first, last = _in_slab(x, T[2, 0], slab[0] - feet[0], slab[1] + feet[0], columns.tops[j, i] - columns.bottom)
+            high, low = min(s - steep * first + feet[2], reach - STEP_M), max(s - steep * last - feet[2], -reach)
+            if first > last or low > high or h - feet[1] >= reach or h + feet[1] <= -reach:
+                continue
+            begin, end = int((low + reach) / STEP_M), int((high + reach) / STEP_M) + 1
+            for k in range(max(0, int((h - feet[1] + reach) / BIN_M)), min(strips, int((h + feet[1] + reach) / BIN_M) + 1)):
+                filled[k, begin] += 1
+                filled[k, end] -= 1
+    return filled, across, up
+
+
+@njit(cache=True)
+def _footprint(columns: Columns, direction: NDArray) -> float:
+    """How far [m] a column's square reaches from its middle along a direction (3,) of the world."""
+    R = columns.T_world_range
+    x, y = R[0, 0] * direction[0] + R[1, 0] * direction[1], R[0, 1] * direction[0] + R[1, 1] * direction[1]
+    return 0.5 * columns.cell * (abs(x) + abs(y))
+
+
+@njit(cache=True)
+def _near(columns: Columns, point: NDArray, far: float) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Rows and columns of the map, from and to, within `far` [m] of a point (3,) of the world."""
+    R = columns.T_world_range
+    dx, dy = point[0] - R[0, 3], point[1] - R[1, 3]
+    x, y = R[0, 0] * dx + R[1, 0] * dy, R[0, 1] * dx + R[1, 1] * dy
+    ny, nx = columns.tops.shape
+    rows = max(0, int((y - far) / columns.cell)), min(ny, int((y + far) / columns.cell) + 1)
+    return rows, (max(0, int((x - far) / columns.cell)), min(nx, int((x + far) / columns.cell) + 1))
+
+
+@njit(cache=True)
+def _in_slab(x: float, slope: float, low: float, high: float, most: float) -> tuple[float, float]:
+    """From how far below its top to how far a column's middle, which starts at x and moves by -slope for each metre down, is in a slab."""
+    if abs(slope) < 1e-9:
+        return (0.0, most) if low <= x <= high else (1.0, 0.0)
+    one, other = (x - high) / slope, (x - low) / slope
+    return max(0.0, min(one, other)), min(most, max(one, other))
