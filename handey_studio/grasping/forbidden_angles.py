@@ -95,7 +95,7 @@ def insert(first: float, last: float, window: tuple[float, float], ranges: NDArr
             if ranges[body, k, 0] <= high and low <= ranges[body, k, 1]:
                 low, high = min(low, ranges[body, k, 0]), max(high, ranges[body, k, 1])
                 counts[body] -= 1
-                ranges[body, k] = ranges[body, counts[body]]
+                ranges[body, k, 0], ranges[body, k, 1] = ranges[body, counts[body], 0], ranges[body, counts[body], 1]
                 k = 0
             else:
                 k += 1
@@ -107,14 +107,26 @@ def insert(first: float, last: float, window: tuple[float, float], ranges: NDArr
 
 
 @njit(cache=True)
+def _next_start(angle: float, ranges: NDArray, count: int) -> int:
+    """Which range begins first after an angle; -1 for none."""
+    found = -1
+    for k in range(count):
+        if ranges[k, 0] > angle and (found < 0 or ranges[k, 0] < ranges[found, 0]):
+            found = k
+    return found
+
+
+@njit(cache=True)
 def _join_nearest(ranges: NDArray, counts: NDArray, body: int) -> None:
     """Makes one of the two ranges with the least free room between them: more is forbidden, never less."""
-    order = np.argsort(ranges[: counts[body], 0])
-    gaps = ranges[order[1:], 0] - ranges[order[:-1], 1]
-    k = np.argmin(gaps)
-    ranges[order[k], 1] = ranges[order[k + 1], 1]
+    one, other, least = -1, -1, np.inf
+    for k in range(counts[body]):
+        after = _next_start(ranges[k, 1], ranges, counts[body])
+        if after >= 0 and ranges[after, 0] - ranges[k, 1] < least:
+            one, other, least = k, after, ranges[after, 0] - ranges[k, 1]
     counts[body] -= 1
-    ranges[order[k + 1]] = ranges[counts[body]]
+    ranges[one, 1] = ranges[other, 1]
+    ranges[other, 0], ranges[other, 1] = ranges[counts[body], 0], ranges[counts[body], 1]
 
 
 @njit(cache=True)
@@ -125,19 +137,21 @@ def polygon_ranges(
     found = np.empty((6, 2))
     n = len(corners)
     for k in range(n):
-        a, b = corners[k], corners[(k + 1) % n]
-        for f in range(stretch_ranges(a[0], a[1], b[0], b[1], box, found)):
+        j = (k + 1) % n
+        for f in range(stretch_ranges(corners[k, 0], corners[k, 1], corners[j, 0], corners[j, 1], box, found)):
             insert(found[f, 0], found[f, 1], window, ranges, counts, body)
-    if n < 3:
-        return
     middle, low = (box[1] + box[2]) / 2.0, window[0]
-    spans = ranges[body, : counts[body]][np.argsort(ranges[body, : counts[body], 0])]
-    for k in range(len(spans) + 1):
-        high = spans[k, 0] if k < len(spans) else window[1]
+    while n > 2 and low < window[1]:
+        for k in range(counts[body]):
+            if ranges[body, k, 0] <= low <= ranges[body, k, 1]:
+                low = ranges[body, k, 1] + 1e-12
+                break
+        after = _next_start(low, ranges[body], counts[body])
+        high = ranges[body, after, 0] if after >= 0 else window[1]
         between = (low + high) / 2.0
-        if high > low and _inside(corners, -middle * np.cos(between), -middle * np.sin(between)):
+        if low < high and _inside(corners, -middle * np.cos(between), -middle * np.sin(between)):
             insert(low, high, window, ranges, counts, body)
-        low = spans[k, 1] if k < len(spans) else high
+        low = high
 
 
 @njit(cache=True)
@@ -145,7 +159,8 @@ def _inside(corners: NDArray, y: float, z: float) -> bool:
     """Whether a point lies in a convex polygon whose corners run counter-clockwise."""
     n = len(corners)
     for k in range(n):
-        a, b = corners[k], corners[(k + 1) % n]
-        if (b[0] - a[0]) * (z - a[1]) - (b[1] - a[1]) * (y - a[0]) < 0.0:
+        j = (k + 1) % n
+        u, v = corners[j, 0] - corners[k, 0], corners[j, 1] - corners[k, 1]
+        if u * (z - corners[k, 1]) - v * (y - corners[k, 0]) < 0.0:
             return False
     return True

@@ -15,6 +15,7 @@ from handey_studio.geometry import HeightField
 from handey_studio.grasping.forbidden_angles import insert, polygon_ranges, stretch_ranges
 from handey_studio.world import FINGERS, Hand
 from handey_studio.world.collision_bodies import COLUMN_M, TABLE_SKIN_M, Obstacles
+from handey_studio.world.vectors import Vector, dot, plus, times
 
 BIN_M = 0.0005  # columns of the depth map are gathered in strips this wide, across the direction in which they go down
 STEP_M = 0.001  # and along the strips in steps this long
@@ -135,13 +136,14 @@ def clipped(corners: NDArray, low: float, high: float) -> NDArray:
     for i in range(k):
         x = corners[i, 0]
         if low <= x <= high:
-            out[n] = corners[i, 1:]
+            out[n, 0], out[n, 1] = corners[i, 1], corners[i, 2]
             n += 1
         for j in range(i):
             for wall in (low, high):
                 if (x - wall) * (corners[j, 0] - wall) < 0.0:
                     share = (wall - x) / (corners[j, 0] - x)
-                    out[n] = corners[i, 1:] + share * (corners[j, 1:] - corners[i, 1:])
+                    out[n, 0] = corners[i, 1] + share * (corners[j, 1] - corners[i, 1])
+                    out[n, 1] = corners[i, 2] + share * (corners[j, 2] - corners[i, 2])
                     n += 1
     return out[:n]
 
@@ -159,19 +161,15 @@ def hull(points: NDArray) -> NDArray:
             start = i
     here, m = start, 0
     while m < n:
-        out[m] = points[here]
+        out[m, 0], out[m, 1] = points[here, 0], points[here, 1]
         m += 1
-        best, far = -1, 0.0
+        best, x, y, far = -1, 0.0, 0.0, 0.0
         for i in range(n):
-            u, v = points[i] - points[here], points[best] - points[here]
-            away = u[0] * u[0] + u[1] * u[1]
-            if away < 1e-20:
-                continue
-            turn = v[0] * u[1] - v[1] * u[0]
-            if best < 0 or turn < -1e-18 or (turn <= 1e-18 and away > far):
-                best, far = i, away
-        gone = points[best] - points[start]
-        if best < 0 or gone[0] * gone[0] + gone[1] * gone[1] < 1e-20:
+            u, v = points[i, 0] - points[here, 0], points[i, 1] - points[here, 1]
+            away, turn = u * u + v * v, x * v - y * u
+            if away > 1e-20 and (best < 0 or turn < -1e-18 or (turn <= 1e-18 and away > far)):
+                best, x, y, far = i, u, v, away
+        if best < 0 or (points[best, 0] - points[start, 0]) ** 2 + (points[best, 1] - points[start, 1]) ** 2 < 1e-20:
             break
         here = best
     return out[:m]
@@ -216,10 +214,11 @@ def _filled(columns: Columns, T: NDArray, slab: NDArray, box: NDArray) -> tuple[
     strips = 2 * int(np.ceil((np.sqrt(box[0] ** 2 + box[2] ** 2) + BIN_M) / BIN_M))
     reach = 0.5 * BIN_M * strips
     filled = np.zeros((strips, int(np.ceil(2.0 * reach / STEP_M)) + 2), np.int32)
-    side, rise = across[0] * T[:3, 1] + across[1] * T[:3, 2], up[0] * T[:3, 1] + up[1] * T[:3, 2]
-    feet = _footprint(columns, T[:, 0]), _footprint(columns, side), _footprint(columns, rise)
-    far = np.sqrt(reach**2 + max(-slab[0], slab[1]) ** 2) + columns.cell
-    rows, cols = _near(columns, T[:3, 3], far)
+    closing, y, z = _axis(T, 0), _axis(T, 1), _axis(T, 2)
+    side, rise = plus(times(across[0], y), times(across[1], z)), plus(times(up[0], y), times(up[1], z))
+    feet = _footprint(columns, closing), _footprint(columns, side), _footprint(columns, rise)
+    far = np.sqrt(reach * reach + max(-slab[0], slab[1]) ** 2) + columns.cell
+    rows, cols = _near(columns, T[0, 3], T[1, 3], far)
     R, cell = columns.T_world_range, columns.cell
     for j in range(rows[0], rows[1]):
         for i in range(cols[0], cols[1]):
@@ -228,8 +227,9 @@ def _filled(columns: Columns, T: NDArray, slab: NDArray, box: NDArray) -> tuple[
                 continue
             dx = R[0, 0] * (i + 0.5) * cell + R[0, 1] * (j + 0.5) * cell + R[0, 3] - T[0, 3]
             dy = R[1, 0] * (i + 0.5) * cell + R[1, 1] * (j + 0.5) * cell + R[1, 3] - T[1, 3]
-            x, h, s = dx * T[0, 0] + dy * T[1, 0] + top * T[2, 0], dx * side[0] + dy * side[1], dx * rise[0] + dy * rise[1] + top * rise[2]
-            first, last = _in_slab(x, T[2, 0], slab[0] - feet[0], slab[1] + feet[0], columns.tops[j, i] - columns.bottom)
+            offset = (dx, dy, top)
+            x, h, s = dot(offset, closing), dot(offset, side), dot(offset, rise)
+            first, last = _in_slab(x, closing[2], slab[0] - feet[0], slab[1] + feet[0], columns.tops[j, i] - columns.bottom)
             high, low = min(s - steep * first + feet[2], reach - STEP_M), max(s - steep * last - feet[2], -reach)
             if first > last or low > high or h - feet[1] >= reach or h + feet[1] <= -reach:
                 continue
@@ -241,18 +241,24 @@ def _filled(columns: Columns, T: NDArray, slab: NDArray, box: NDArray) -> tuple[
 
 
 @njit(cache=True)
-def _footprint(columns: Columns, direction: NDArray) -> float:
-    """How far [m] a column's square reaches from its middle along a direction (3,) of the world."""
+def _axis(T: NDArray, k: int) -> Vector:
+    """Axis k of a frame."""
+    return T[0, k], T[1, k], T[2, k]
+
+
+@njit(cache=True)
+def _footprint(columns: Columns, direction: Vector) -> float:
+    """How far [m] a column's square reaches from its middle along a direction of the world."""
     R = columns.T_world_range
     x, y = R[0, 0] * direction[0] + R[1, 0] * direction[1], R[0, 1] * direction[0] + R[1, 1] * direction[1]
     return 0.5 * columns.cell * (abs(x) + abs(y))
 
 
 @njit(cache=True)
-def _near(columns: Columns, point: NDArray, far: float) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Rows and columns of the map, from and to, within `far` [m] of a point (3,) of the world."""
+def _near(columns: Columns, px: float, py: float, far: float) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Rows and columns of the map, from and to, within `far` [m] of a point of the world."""
     R = columns.T_world_range
-    dx, dy = point[0] - R[0, 3], point[1] - R[1, 3]
+    dx, dy = px - R[0, 3], py - R[1, 3]
     x, y = R[0, 0] * dx + R[1, 0] * dy, R[0, 1] * dx + R[1, 1] * dy
     ny, nx = columns.tops.shape
     rows = max(0, int((y - far) / columns.cell)), min(ny, int((y + far) / columns.cell) + 1)
