@@ -29,6 +29,18 @@ STANDOFFS_M = (0.08, 0.05)  # the approach starts with the fingertips this far i
 CLOSED_MARGIN_M = 1e-4  # fingers that close on a part keep this from all else; what stands beside the part is that near
 
 
+@dataclass(frozen=True)
+class Fall:
+    """Why an option fell, as the ledger tells it."""
+
+    reason: str
+    value: float | None = None
+    limit: float | None = None
+    unit: str = ""
+    bodies: tuple[str, ...] = ()
+    posture: Posture | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Grasp(Value):
     """A grasp that can be approached: hand poses at both ends and the way in. `approach_hands` (k, 4, 4) ends at the pickup."""
@@ -81,33 +93,54 @@ def grasp_plane_of(option: Option) -> GraspPlane:
     return fill_grasp_plane(option.goal.at_start, T_world_plane, group.point, hand, option.opening)
 
 
-def grasps_at(option: Option, rotations: LegalRotations, plane: GraspPlane, angle: float, entry: int, ledger: Ledger) -> list[Grasp]:
-    """The grasps that the bump-line planner reaches from one hand angle, one for each way round of the hand; none if it falls."""
+@dataclass(frozen=True, eq=False)
+class Approach(Value):
+    """The way in to a grasp group at the pickup from one hand angle: the bump-line run, the contact area [m²] where it ends, and why it
+    does not do, None if it does. It does not depend on where the part goes."""
+
+    run: BumpRun
+    area: float
+    fell: Fall | None
+
+    @property
+    def final(self) -> NDArray:
+        """Fingertip point y, z [m] and angle [rad] in the grasp plane where the run ends."""
+        return self.run.path[-1]
+
+
+def approach_at(option: Option, plane: GraspPlane, angle: float) -> Approach:
+    """The approach of an option from one hand angle."""
     hand, group = option.goal.at_start.robot.hand, option.group
     run = approach_run(plane, group, hand, angle)
-    T_part_plane = group.grasp_class.T_part_plane
     final = run.path[-1]
-    last = option.T_world_start @ T_part_plane @ hand_in_plane(final[:2], final[2], 1)
+    T_world_hand = option.T_world_start @ group.grasp_class.T_part_plane @ hand_in_plane(final[:2], final[2], 1)
+    posture = hand_posture(option, T_world_hand, option.opening, 0)
+    area = contact_area(group.grasp_class, hand, final[:2], final[2])
     if run.status != "reached":
         reason = {"stuck": "the approach got stuck", "iterations": "the approach ran out of steps"}
-        ledger.fall(entry, reason.get(run.status, "the way in starts blocked"), value=run.distance, limit=run.threshold, unit="m",
-                    posture=hand_posture(option, last, option.opening, 0))  # fmt: skip
-        return []
-    area = contact_area(group.grasp_class, hand, final[:2], final[2])
+        words = reason.get(run.status, "the way in starts blocked")
+        return Approach(run, area, Fall(words, run.distance, run.threshold, "m", posture=posture))
     if area < hand.min_contact_area:
-        ledger.fall(entry, "the fingers overlap the face too little after the approach", value=area, limit=hand.min_contact_area,
-                    unit="m²", posture=hand_posture(option, last, option.opening, 0))  # fmt: skip
-        return []
-    if _blocked(option, last, option.goal.T_world_goal @ T_part_plane @ _straight_back(final, 1)[0], entry, ledger):
+        words = "the fingers overlap the face too little after the approach"
+        return Approach(run, area, Fall(words, area, hand.min_contact_area, "m²", posture=posture))
+    return Approach(run, area, _blocked(option, T_world_hand, 0))
+
+
+def grasps_at(option: Option, rotations: LegalRotations, approach: Approach, entry: int, ledger: Ledger) -> list[Grasp]:
+    """The grasps at the end of an approach, one for each way round of the hand; none if it falls."""
+    final, T_part_plane = approach.final, option.group.grasp_class.T_part_plane
+    fell = approach.fell or _blocked(option, option.goal.T_world_goal @ T_part_plane @ _straight_back(final, 1)[0], 1)
+    if fell is not None:
+        ledger.fall(entry, fell.reason, value=fell.value, limit=fell.limit, unit=fell.unit, bodies=fell.bodies, posture=fell.posture)
         return []
     found = []
     for side in (1, -1):
-        in_plane = np.array([hand_in_plane(pose[:2], pose[2], side) for pose in run.path])
+        in_plane = np.array([hand_in_plane(pose[:2], pose[2], side) for pose in approach.run.path])
         hands = option.T_world_start @ T_part_plane @ in_plane
         retreat = option.goal.T_world_goal @ T_part_plane @ _straight_back(final, side)
-        choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), area)
+        choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), approach.area)
         turned = ledger.add("hand", "one way round" if side > 0 else "the other way round", parent=entry)
-        found.append(Grasp(option, choice, run, hands, retreat, turned))
+        found.append(Grasp(option, choice, approach.run, hands, retreat, turned))
     return found
 
 
@@ -128,18 +161,17 @@ def finger_pairs(name: str) -> tuple[tuple[str, str], ...]:
     return tuple((finger, name) for finger in FINGERS)
 
 
-def _blocked(option: Option, T_world_pickup: NDArray, T_world_putdown: NDArray, entry: int, ledger: Ledger) -> bool:
-    """Whether the hand meets something at either end where the approach has led it, open around the part or closed on it."""
-    goal, width = option.goal, option.group.grasp_class.width
-    touching = finger_pairs(goal.instance.name)
-    for end, (where, world, T) in enumerate((("pickup", goal.at_start, T_world_pickup), ("putdown", goal.at_goal, T_world_putdown))):
-        for how, apart, pairs, margin in (("open", option.opening, (), HAND_MARGIN_M), ("closed", width, touching, CLOSED_MARGIN_M)):
-            clearance = collision_model(world).hand_contact(T, apart, allowed=pairs)
-            if clearance.distance < margin:
-                ledger.fall(entry, f"the {how} hand collides at the {where}", value=clearance.distance, limit=margin, unit="m",
-                            bodies=clearance.bodies, posture=hand_posture(option, T, apart, end))  # fmt: skip
-                return True
-    return False
+def _blocked(option: Option, T_world_hand: NDArray, end: int) -> Fall | None:
+    """What the hand meets at one end (0 pickup, 1 putdown) where the approach has led it, open around the part or closed on it."""
+    goal, width, where = option.goal, option.group.grasp_class.width, ("pickup", "putdown")[end]
+    model = collision_model((goal.at_start, goal.at_goal)[end])
+    tries = (("open", option.opening, (), HAND_MARGIN_M), ("closed", width, finger_pairs(goal.instance.name), CLOSED_MARGIN_M))
+    for how, apart, pairs, margin in tries:
+        clearance = model.hand_contact(T_world_hand, apart, allowed=pairs)
+        if clearance.distance < margin:
+            posture = hand_posture(option, T_world_hand, apart, end)
+            return Fall(f"the {how} hand collides at the {where}", clearance.distance, margin, "m", clearance.bodies, posture)
+    return None
 
 
 def _straight_back(final: NDArray, side: int) -> NDArray:

@@ -4,19 +4,21 @@ Handey "simply lists all possible solutions, ranks them heuristically, and tries
 search (`search`), and every one that falls leaves its reason in the ledger.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Value, frozen_array
-from handey_studio.geometry.transforms import inverse
+from handey_studio.geometry.transforms import from_xyz_rpy, inverse
 from handey_studio.grasping import GraspEnd, GraspGroup, angle_range, grasp_groups, opening_around
 from handey_studio.world import PlacedPart, World
 from handey_studio.world.collision import ALLOWED_DEPTH_M
-from handey_studio.world.support import MAX_GAP_M, TOUCHING_M, neighbours
+from handey_studio.world.support import MAX_GAP_M, TOUCHING_M, Neighbour, neighbours
 
 Pairs = tuple[tuple[str, str], ...]
+
+CLIMB_M = (0.004, 0.012, 0.03, 0.06)  # the part alone must be free at these heights above both its places
 
 OFF_CENTRE_COST = 4.0  # [rad/m]: a grasp 10 cm off the centre of mass ranks like one tilted by 0.4 rad more
 
@@ -87,25 +89,36 @@ def check_goal(
     if outside > 0 and placed.corners_world[:, 2].min() > world.table_z - ALLOWED_DEPTH_M:
         ledger.fall(entry, "the destination lies outside the free space", value=outside, limit=0.0, unit="m")
         return None
-    near = neighbours(carried, placed, MAX_GAP_M)
-    for neighbour in near:
-        if neighbour.gap < -ALLOWED_DEPTH_M:
-            ledger.fall(entry, "the part would stand in something at the destination", value=-neighbour.gap,
-                        limit=ALLOWED_DEPTH_M, unit="m", bodies=(instance.name, neighbour.name))  # fmt: skip
-            return None
+    near, beside = neighbours(carried, placed, MAX_GAP_M), neighbours(carried, instance)
+    if _in_the_way(near, "the part would stand in something at the destination", placed.name, entry, ledger):
+        return None
     if not any(neighbour.below for neighbour in near):
         height = placed.corners_world[:, 2].min() - world.table_z
         ledger.fall(entry, "nothing holds the part up at the destination", value=height, limit=MAX_GAP_M, unit="m")
         return None
-    beside = neighbours(carried, instance)
-    for neighbour in beside:
-        if neighbour.gap < -ALLOWED_DEPTH_M:
-            ledger.fall(entry, "something lies on the part where it is", value=-neighbour.gap, limit=ALLOWED_DEPTH_M, unit="m",
-                        bodies=(instance.name, neighbour.name))  # fmt: skip
-            return None
+    if _in_the_way(beside, "something lies on the part where it is", placed.name, entry, ledger):
+        return None
+    for standing, what in ((instance, "the part cannot be lifted straight up"), (placed, "the part cannot be lowered straight down")):
+        for height in CLIMB_M:
+            if _in_the_way(neighbours(carried, raised(standing, height)), what, placed.name, entry, ledger):
+                return None
     at_start = tuple((instance.name, neighbour.name) for neighbour in beside)
     at_goal = tuple((instance.name, neighbour.name) for neighbour in near if neighbour.gap <= TOUCHING_M)
     return Goal(instance, label, T_world_goal, entry, world, carried, carried.with_part(placed), at_start, at_goal)
+
+
+def raised(placed: PlacedPart, height: float) -> PlacedPart:
+    """The same instance that much [m] higher."""
+    return replace(placed, T_world_part=from_xyz_rpy((0.0, 0.0, height), (0.0, 0.0, 0.0)) @ placed.T_world_part)
+
+
+def _in_the_way(near: tuple[Neighbour, ...], what: str, name: str, entry: int, ledger: Ledger) -> bool:
+    """Whether the part is deeper in one of its neighbours than touching bodies may be; if so the entry falls."""
+    for neighbour in near:
+        if neighbour.gap < -ALLOWED_DEPTH_M:
+            ledger.fall(entry, what, value=-neighbour.gap, limit=ALLOWED_DEPTH_M, unit="m", bodies=(name, neighbour.name))
+            return True
+    return False
 
 
 def options_of(goal: Goal, ledger: Ledger) -> list[Option]:

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Share
-from handey_studio.grasping import LegalRotations, legal_rotations
+from handey_studio.grasping import GraspPlane, LegalRotations, legal_rotations
 from handey_studio.task.carrying import Carried, Kept, Start, join, worst
 from handey_studio.task.detours import detours
 from handey_studio.task.ends import PICKUP, PUTDOWN, End, pickup_end, putdown_end, reachable
-from handey_studio.task.grasps import Grasp, fall_illegal, grasp_plane_of, grasps_at
+from handey_studio.task.grasps import Approach, Grasp, approach_at, fall_illegal, grasp_plane_of, grasps_at
 from handey_studio.task.options import Goal, Option, options_of
 from handey_studio.task.plan import Carry, MovePlan, Step
 from handey_studio.task.stages import APPROACH, DETOUR, PATHS, REACH, ROTATIONS, STAGES, STRAIGHT, left
@@ -80,6 +80,9 @@ class OptionSearch:
     _heap: list[tuple[float, int, Node]] = field(default_factory=list)
     _pushed: int = 0
     _kept: Kept = field(default_factory=dict)
+    _shut: dict[tuple, LegalRotations] = field(default_factory=dict)
+    _planes: dict[tuple, GraspPlane] = field(default_factory=dict)
+    _approaches: dict[tuple, Approach] = field(default_factory=dict)
     _ends: dict[tuple, End | None] = field(default_factory=dict)
     _lost: list[NDArray] = field(default_factory=list)
 
@@ -146,23 +149,32 @@ class OptionSearch:
     def _rotations(self, node: Node) -> None:
         option: Option = node.what
         entry = self.ledger.add("grasp group", option.name, parent=node.entry)
-        rotations = legal_rotations(option.group, option.pickup, option.putdown)
+        here = _pickup_of(option)
+        rotations = self._shut.get(here) or legal_rotations(option.group, option.pickup, option.putdown)
+        if not rotations.ranges("pickup"):
+            self._shut[here] = rotations
         if not rotations.legal:
             fall_illegal(option, rotations, entry, self.ledger)
             return
-        plane: list = []  # filled once, by the first angle that is looked at
         best = rotations.best(ANGLES)
         for angle in best:
             extra = _tilt_at(rotations, angle) - _tilt_at(rotations, best[0])
-            self._push(Node(APPROACH, node.route, (option, rotations, angle, plane), node.cost + extra, entry))
+            self._push(Node(APPROACH, node.route, (option, rotations, angle), node.cost + extra, entry))
 
     def _approach(self, node: Node) -> None:
-        option, rotations, angle, plane = node.what
-        if not plane:
-            plane.append(grasp_plane_of(option))
+        option, rotations, angle = node.what
         entry = self.ledger.add("approach", f"hand at {np.rad2deg(angle - option.group.angle):+.0f}°", parent=node.entry)
-        for grasp in grasps_at(option, rotations, plane[0], angle, entry, self.ledger):
+        for grasp in grasps_at(option, rotations, self._way_in(option, angle), entry, self.ledger):
             self._push(Node(REACH, node.route, grasp, node.cost, grasp.entry))
+
+    def _way_in(self, option: Option, angle: float) -> Approach:
+        """The approach at the pickup, which is the same wherever the part goes."""
+        here = _pickup_of(option)
+        if (*here, angle) not in self._approaches:
+            if here not in self._planes:
+                self._planes[here] = grasp_plane_of(option)
+            self._approaches[*here, angle] = approach_at(option, self._planes[here], angle)
+        return self._approaches[*here, angle]
 
     def _reach(self, node: Node) -> None:
         grasp: Grasp = node.what
@@ -220,6 +232,11 @@ TESTS: dict[int, Callable[[OptionSearch, Node], MovePlan | None]] = {
     STRAIGHT: OptionSearch._straight,
     PATHS: OptionSearch._paths,
 }
+
+
+def _pickup_of(option: Option) -> tuple:
+    """What everything at the pickup depends on: wherever the part goes from here, it is the same."""
+    return option.goal.at_start, option.T_world_start.tobytes(), option.group
 
 
 def _tilt_at(rotations: LegalRotations, angle: float) -> float:

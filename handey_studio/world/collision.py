@@ -44,7 +44,7 @@ from handey_studio.world.part import Held
 from handey_studio.world.robot import Robot
 from handey_studio.world.world import World
 
-ALLOWED_DEPTH_M = 0.0012  # bodies that may touch may be believed this deep in each other: 1 mm of contact, and the error of a pose
+ALLOWED_DEPTH_M = 0.0012  # bodies that may touch may be believed this deep in each other: a cell of the depth map, and the error of a pose
 MOST_BODIES = 64  # grasps whose bodies are kept at hand
 FAR_M = 1e3  # farther than anything: no limit to a search for the nearest pair
 HELD = 1  # number of whatever the hand holds; the depth map's is 0

@@ -48,11 +48,11 @@ def _unlike(vectors: NDArray) -> NDArray:
 
 
 def column_depths(body: NDArray, directions: Directions, R: NDArray, columns: NDArray) -> NDArray:
-    """Depth [m] (k,) that a body of corners (n, 3) stands in columns (k, 8, 3) of the depth map: upwards out of each, or sideways less the
-    column's own width; 0 where it does not. `R` (3, 3) turns the body's own directions into the world.
+    """Depth [m] (k,) that a body of corners (n, 3) stands in columns (k, 8, 3) of the depth map: the least shift that parts them,
+    upwards or sideways; 0 where it does not. `R` (3, 3) turns the body's own directions into the world.
 
-    Where in its cell a column's edge lies the map does not tell, so a body beside it may reach a cell into it. The columns' corners
-    are in the order in which z changes fastest and x slowest.
+    Where in its cell a column's edge lies the map does not tell, so a body beside it may reach a cell into it and still only touch.
+    The columns' corners are in the order in which z changes fastest and x slowest.
     """
     sides = columns[:, [4, 2, 1]] - columns[:, :1]
     lengths = np.linalg.norm(sides, axis=2)
@@ -64,7 +64,7 @@ def column_depths(body: NDArray, directions: Directions, R: NDArray, columns: ND
     centre = columns.mean(axis=1) @ along.T
     shift = np.minimum(mine.max(axis=0) - centre + half, centre + half - mine.min(axis=0)).min(axis=1)
     lift = columns[:, :, 2].max(axis=1) - body[:, 2].min()
-    return np.clip(np.minimum(lift, shift - lengths[:, 0]), 0.0, None)
+    return np.clip(np.minimum(lift, shift), 0.0, None)
 
 
 @njit(cache=True)

@@ -1,14 +1,16 @@
 """What a standing part touches, and what holds it up."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import fcl
 import numpy as np
 from numpy.typing import NDArray
 
+from handey_studio.geometry import HeightField
 from handey_studio.geometry.transforms import apply
 from handey_studio.world.collision import fcl_convex, least_side, penetration
-from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, columns_of, solids_of
+from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, solids_of, terrain_obstacles
 from handey_studio.world.column_depth import column_depths, column_distances, directions_of
 from handey_studio.world.gjk import distance
 from handey_studio.world.part import PlacedPart
@@ -49,14 +51,22 @@ def _solids(world: World, piece: NDArray, within: float) -> list[tuple[str, floa
 
 def _columns(world: World, placed: PlacedPart, own: NDArray, piece: NDArray, within: float) -> list[tuple[str, float, float]]:
     """The same of the depth map: its columns' least gap, and the lowest of them."""
-    columns = columns_of(world.terrain, world.table_z, float(world.free_space[1, 2]))
-    columns = columns[~_apart(columns, piece.min(axis=0) - within, piece.max(axis=0) + within)]
+    columns, low, high = _terrain(world.terrain, world.table_z, float(world.free_space[1, 2]))
+    near = ((high >= piece.min(axis=0) - within) & (low <= piece.max(axis=0) + within)).all(axis=1)
+    columns = columns[near]
     gaps = column_distances(piece, columns, within + 1e-9)
     meeting = gaps <= 0.0
     if meeting.any():
         gaps[meeting] = -column_depths(piece, directions_of(own), placed.T_world_part[:3, :3], columns[meeting])
     columns, gaps = columns[gaps <= within], gaps[gaps <= within]
     return [(DEPTH_MAP, float(gaps.min()), float(columns[:, :, 2].min()))] if len(gaps) else []
+
+
+@lru_cache(maxsize=8)
+def _terrain(terrain: HeightField | None, table_z: float, ceiling: float) -> tuple[NDArray, NDArray, NDArray]:
+    """The depth map's columns (k, 8, 3) [m], and their bounding boxes (k, 3) twice."""
+    columns = terrain_obstacles(terrain, table_z, ceiling).corners.reshape(-1, 8, 3)
+    return columns, columns.min(axis=1), columns.max(axis=1)
 
 
 def _apart(stack: NDArray, low: NDArray, high: NDArray) -> NDArray:
