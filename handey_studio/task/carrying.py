@@ -154,7 +154,7 @@ def _clearances(world: World, timed: Trajectory, held: Held | None, pairs: Pairs
     """Least distance (n,) [m] at each time between whatever may not touch, at most `TOLD_M`."""
     model = collision_model(world)
     at = zip(timed.q_rad, timed.hand_opening_m, strict=True)
-    return np.array([min(model.clearance(q, float(opening), held, pairs, limit=TOLD_M).distance, TOLD_M) for q, opening in at])
+    return np.array([model.nearest(q, float(opening), held, pairs, limit=TOLD_M) for q, opening in at])
 
 
 def worst(certificates: list[Certificate]) -> Certificate:

@@ -135,6 +135,12 @@ class CollisionModel:
         """Least distance of the whole arm at q (n,) [rad]; with no pair nearer than `limit` that number and no names."""
         return self._clearance(forward(self.chain, np.array(q, dtype=float)), opening, held, allowed, limit, self.bodies(held))
 
+    def nearest(self, q: NDArray, opening: float, held: Held | None = None, allowed: Pairs = (), limit: float = FAR_M) -> float:
+        """The least distance [m] alone, 0 where bodies meet, at most `limit`: what touches that may is not looked at."""
+        bodies = self.bodies(held)
+        placing = bodies.place(forward(self.chain, np.array(q, dtype=float)), opening)
+        return float(Hit(*least_clearance(bodies.shapes, placing.corners, self.scene(held, allowed), float(limit))).distance)
+
     def in_contact(
         self, q: NDArray, opening: float, held: Held | None = None, allowed: Pairs = (), margin: float = 0.0
     ) -> Clearance | None:
@@ -193,30 +199,30 @@ class CollisionModel:
         names = self.pair(hit, bodies) if hit.kind >= 0 else ()
         if not (scene.rules == ALLOWED).any():
             return Clearance(float(found), names)
-        overlaps = [Hit(*overlap) for overlap in allowed_overlaps(bodies.shapes, placing.corners, scene)]
+        overlaps = allowed_overlaps(bodies.shapes, placing.corners, scene)
         depth, deepest = max(self._depths(overlaps, bodies, placing), default=(0.0, None))
         return Clearance(float(found), names, float(depth), self.pair(deepest, bodies) if deepest else ())
 
-    def _depths(self, overlaps: list[Hit], bodies: Bodies, placing: Placing) -> list[tuple[float, Hit]]:
+    def _depths(self, overlaps: NDArray, bodies: Bodies, placing: Placing) -> list[tuple[float, Hit]]:
         """How deep [m] each of several overlaps is; of those of one body with the depth map only the deepest."""
-        columns: dict[int, list[Hit]] = {}
-        for overlap in overlaps:
-            if overlap.kind == 1:
-                columns.setdefault(overlap.body, []).append(overlap)
-        deepest = [max(zip(self._in_columns(hits, bodies, placing), hits, strict=True)) for hits in columns.values()]
-        return [*deepest, *((self._depth(hit, bodies, placing), hit) for hit in overlaps if hit.kind != 1)]
+        found = [(self._depth(hit, bodies, placing), hit) for hit in (Hit(0.0, *map(int, row)) for row in overlaps[overlaps[:, 1] != 1])]
+        columns = overlaps[overlaps[:, 1] == 1]
+        for b in np.unique(columns[:, 0]):
+            others = columns[columns[:, 0] == b, 2]
+            depths = self._in_columns(int(b), others, bodies, placing)
+            k = int(np.argmax(depths))
+            found.append((float(depths[k]), Hit(0.0, int(b), 1, int(others[k]))))
+        return found
 
-    def _in_columns(self, hits: list[Hit], bodies: Bodies, placing: Placing) -> list[float]:
-        """How deep [m] one body stands in each of the columns that it meets: many of them tell how deep a wide body stands."""
-        b = hits[0].body
-        columns = self.terrain.corners.reshape(-1, 8, 3)[[hit.other for hit in hits]]
+    def _in_columns(self, b: int, others: NDArray, bodies: Bodies, placing: Placing) -> NDArray:
+        """How deep [m] body b stands in each of the columns that it meets: many of them tell how deep a wide body stands."""
         R = placing.poses[bodies.shapes.link[b], :3, :3]
-        return column_depths(self._moving(b, bodies, placing), bodies.directions(b), R, columns).tolist()
+        return column_depths(self._moving(b, bodies, placing), bodies.directions(b), R, self.terrain.corners.reshape(-1, 8, 3)[others])
 
     def _depth(self, hit: Hit, bodies: Bodies, placing: Placing) -> float:
         """How deep [m] two bodies overlap."""
         if hit.kind == 1:
-            return self._in_columns([hit], bodies, placing)[0]
+            return float(self._in_columns(hit.body, np.array([hit.other]), bodies, placing)[0])
         mine = self._moving(hit.body, bodies, placing)
         if hit.kind == 2:
             theirs = self._moving(hit.other, bodies, placing)

@@ -167,10 +167,10 @@ def least_clearance(shapes: Shapes, corners: NDArray, scene: Scene, limit: float
 
 
 @njit(cache=True)
-def allowed_overlaps(shapes: Shapes, corners: NDArray, scene: Scene) -> list[Hit]:
-    """Every fixed body that a moving body may touch and does meet."""
+def allowed_overlaps(shapes: Shapes, corners: NDArray, scene: Scene) -> NDArray:
+    """Every fixed body that a moving body may touch and does meet: rows (n, 3) of `Hit`'s body, kind and other."""
     spans = bounds(shapes, corners)
-    hits = [Hit(0.0, -1, -1, -1)]
+    hits, count = np.empty((64, 3), np.int64), 0
     todo = np.empty(128, np.int64)
     for b in range(len(shapes.link)):
         row = scene.rules[shapes.name[b]]
@@ -189,8 +189,11 @@ def allowed_overlaps(shapes: Shapes, corners: NDArray, scene: Scene) -> list[Hit
                     todo[depth], todo[depth + 1] = fixed.tree.left[node], k
                     depth += 2
                 elif row[fixed.name[k]] == ALLOWED and _meet(shapes, corners, b, fixed, k):
-                    hits.append(Hit(0.0, b, kind, k))
-    return hits[1:]
+                    if count == len(hits):
+                        hits = np.concatenate((hits, np.empty_like(hits)))
+                    hits[count, 0], hits[count, 1], hits[count, 2] = b, kind, k
+                    count += 1
+    return hits[:count]
 
 
 @njit(cache=True)
