@@ -1,6 +1,7 @@
 """§5: grasp classes and approach groups, legal rotations, and the bump-line approach in the grasp plane."""
 
-from handey_studio.grasping.bump_lines import BumpLines, BumpOptions, BumpRun, bump_lines, plan_approach
+from handey_studio.grasping.bump_lines import BumpLines, BumpOptions, bump_lines, plan_approach
+from handey_studio.grasping.bump_run import BumpIterations, BumpRun
 from handey_studio.grasping.classes import (
     GraspClass,
     GraspOptions,
@@ -11,10 +12,13 @@ from handey_studio.grasping.classes import (
     opening_around,
 )
 from handey_studio.grasping.free_patches import Patch, PatchOptions, Wanted, free_patches
+from handey_studio.grasping.grasp_motion import MotionOptions, plan_grasp_motion, plan_lowering, plan_retreat
 from handey_studio.grasping.grasp_placement_table import GraspPlacementTable, TableOptions, grasp_placement_table, legal_at, tilts_at
 from handey_studio.grasping.grasp_plane import GraspPlane, fill_grasp_plane
 from handey_studio.grasping.groups import GraspGroup, grasp_groups
+from handey_studio.grasping.hand_outline import hand_outline, outline_with
 from handey_studio.grasping.placements import Placement, PlacementOptions, stable_placements
+from handey_studio.grasping.plane_search import SearchOptions, plane_space
 from handey_studio.grasping.regrasps import GOAL, START, RegraspSequence, SequenceCosts, Transfer, sequences, why_none
 from handey_studio.grasping.rotations import (
     HAND_MARGIN_M,
@@ -31,6 +35,7 @@ __all__ = [
     "GOAL",
     "HAND_MARGIN_M",
     "START",
+    "BumpIterations",
     "BumpLines",
     "BumpOptions",
     "BumpRun",
@@ -42,12 +47,14 @@ __all__ = [
     "GraspPlacementTable",
     "GraspPlane",
     "LegalRotations",
+    "MotionOptions",
     "Patch",
     "PatchOptions",
     "Placement",
     "PlacementOptions",
     "RegraspSequence",
     "RotationFault",
+    "SearchOptions",
     "SequenceCosts",
     "TableOptions",
     "Transfer",
@@ -62,10 +69,16 @@ __all__ = [
     "grasp_groups",
     "grasp_placement_table",
     "hand_in_plane",
+    "hand_outline",
     "legal_at",
     "legal_rotations",
     "opening_around",
+    "outline_with",
     "plan_approach",
+    "plan_grasp_motion",
+    "plan_lowering",
+    "plan_retreat",
+    "plane_space",
     "sequences",
     "stable_placements",
     "tilt",

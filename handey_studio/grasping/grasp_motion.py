@@ -1,0 +1,173 @@
+"""The hand's ways in and out of a grasp, in its plane: bump lines first, and what escapes from where they get stuck (Handey 1987 §5.2)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.grasping.bump_lines import BumpOptions, plan_approach
+from handey_studio.grasping.bump_run import BumpRun, FoundBy
+from handey_studio.grasping.classes import contact_area
+from handey_studio.grasping.grasp_plane import GraspPlane
+from handey_studio.grasping.groups import GraspGroup
+from handey_studio.grasping.hand_outline import Outline, hand_outline
+from handey_studio.grasping.plane_paths import is_free, shortened
+from handey_studio.grasping.plane_search import PlaneSpace, SearchOptions, plane_space, way_out
+from handey_studio.world import Hand
+
+
+@dataclass(frozen=True)
+class MotionOptions:
+    """The bump-line planner starts straight back from the grasp by each of `standoffs` [m]; then by the first one in directions off by
+    `asides` [rad], with the hand as it is to be in the end and with the hand turned as well. Leaving, the same the other way round. Where
+    the search may end anywhere, a radian that the fingers are off straight down costs as much as a way of `tilt_cost` [m]. What is put
+    down comes the last bit, `last_bit` [m] at most, on a straight line, as it may touch what it stands on."""
+
+    standoffs: tuple[float, ...] = (0.08, 0.05)
+    asides: tuple[float, ...] = (0.35, -0.35, 0.7, -0.7)
+    tilt_cost: float = 0.05
+    last_bit: float = 0.06
+    bumps: BumpOptions = field(default_factory=BumpOptions)
+    search: SearchOptions = field(default_factory=SearchOptions)
+
+
+def plan_grasp_motion(
+    plane: GraspPlane,
+    hand: Hand,
+    group: GraspGroup,
+    angle: float,
+    ranges: NDArray | None = None,
+    options: MotionOptions = MotionOptions(),
+) -> BumpRun:
+    """The way in for a grasp group with the hand in the end at `angle` [rad], or as near to it as the bump lines' turns leave it.
+
+    `ranges` (m, 2) [rad] are the hand angles that are legal at the grasp, all if None. Bump lines from several starts come first, then the
+    search of the plane's configuration space, which also settles that there is no way; the run says which it was (`found_by`). A run that
+    has reached ends at a legal angle, overlaps the face sufficiently, and has a shortened path. If none has, it is the nearest one.
+    """
+    outline, nearest = hand_outline(hand), None
+    for start, found_by in _starts(np.array([*group.point, angle]), group.depth, options):
+        run = _judged(plan_approach(plane, hand, start, group.point, options.bumps), hand, group, ranges)
+        if run.status == "reached":
+            path = shortened(plane, outline, run.path, options.search.margin)
+            return replace(run, path=path, found_by=found_by)
+        nearest = run if nearest is None or run.distance < nearest.distance else nearest
+    assert nearest is not None
+    space = plane_space(plane, outline, np.array([*group.point, angle]), options.search)
+    path, allowed = None, _allowed(space, hand, group, ranges)
+    for angles in ([a for a in allowed if a == space.root[2]], allowed):
+        sources = [_first_free(plane, outline, space, a, -_along(a), options.search.out) for a in angles]
+        path = _ways(plane, outline, space, [found for found in sources if found is not None], options) if path is None else path
+    if path is None:
+        return replace(nearest, status="no way") if nearest.status != "short contact" else nearest
+    return replace(nearest, path=path[::-1], status="reached", distance=0.0, found_by="plane search")
+
+
+def plan_retreat(plane: GraspPlane, hand: Hand, pose: NDArray, options: MotionOptions = MotionOptions()) -> BumpRun:
+    """The way out of a grasp from a pose (y, z, angle) of the open hand among what stands around the putdown: the reverse of the way in.
+
+    Straight back along the fingers if that is free, else led by bump lines to one of the places where a way in might start, else by search.
+    The path begins at the pose; `goal` is where it was to lead.
+    """
+    outline, pose = hand_outline(hand), np.array(pose, dtype=float)
+    (out, _), *others = _starts(pose, 0.0, options)
+    if is_free(plane, outline, pose, out):
+        path = shortened(plane, outline, np.array([pose, out]), 0.0)
+        return BumpRun(plane, path, out[:2], "reached", 0.0, options.bumps.threshold, "straight back")
+    nearest = plan_approach(plane, hand, pose, out[:2], options.bumps)
+    for target, _ in others:
+        if nearest.status in ("reached", "blocked start"):
+            break
+        run = plan_approach(plane, hand, pose, target[:2], options.bumps)
+        nearest = run if run.status == "reached" else nearest
+    if nearest.status in ("reached", "blocked start"):
+        return replace(nearest, path=shortened(plane, outline, nearest.path, options.search.margin))
+    space = plane_space(plane, outline, pose, options.search)
+    source = _first_free(plane, outline, space, pose[2], -_along(pose[2]), options.search.out)
+    path = _ways(plane, outline, space, [source] if source is not None else [], options)
+    if path is None:
+        return replace(nearest, status="no way")
+    return replace(nearest, path=path, goal=path[-1, :2], status="reached", distance=0.0, found_by="plane search")
+
+
+def plan_lowering(plane: GraspPlane, outline: Outline, pose: NDArray, options: MotionOptions = MotionOptions()) -> BumpRun:
+    """The way of the hand with a part in it down to where the part is put down, at the pose (y, z, angle) of the hand.
+
+    `plane` and `outline` are those of hand and part together (`fill_grasp_plane` with `held`, `outline_with`). The last bit is straight, up
+    to where part and hand are clear of filled cells: upwards or back along the fingers, or between; it is not looked at here, as the part
+    may touch there. Beyond it the search leads. The path ends at the pose.
+    """
+    pose = np.array(pose, dtype=float)
+    space = plane_space(plane, outline, pose, options.search)
+    up, back = plane.T_world_plane[2, 1:3], -_along(pose[2])
+    directions = [direction / max(float(np.linalg.norm(direction)), 1e-9) for direction in (up, up + back, back)]
+    found = [_first_free(plane, outline, space, pose[2], d, options.last_bit, looked_at=False) for d in directions]
+    path = _ways(plane, outline, space, [nodes for nodes in found if nodes is not None], options)
+    if path is None:
+        return BumpRun(plane, pose[None], pose[:2], "no way", options.search.out, options.bumps.threshold)
+    return BumpRun(plane, path[::-1], pose[:2], "reached", 0.0, options.bumps.threshold, "plane search")
+
+
+def _starts(pose: NDArray, depth: float, options: MotionOptions) -> Iterator[tuple[NDArray, FoundBy]]:
+    """Poses (3,) from where a way in may start, and what a run from there is called."""
+    for standoff in options.standoffs:
+        back = pose[:2] - (standoff + depth) * _along(pose[2])
+        yield np.append(back, pose[2]), "bump lines" if standoff == options.standoffs[0] else "another start"
+    for aside in options.asides:
+        back = pose[:2] - (options.standoffs[0] + depth) * _along(pose[2] + aside)
+        yield np.append(back, pose[2]), "another start"
+        yield np.append(back, pose[2] + aside), "another start"
+
+
+def _judged(run: BumpRun, hand: Hand, group: GraspGroup, ranges: NDArray | None) -> BumpRun:
+    """The run, not reached after all if it ended at an angle that is not legal or with too little overlap of finger and face."""
+    if run.status == "reached" and not _is_legal(run.path[-1, 2], ranges):
+        return replace(run, status="stuck", found_by="")
+    if run.status == "reached" and contact_area(group.grasp_class, hand, run.path[-1, :2], run.path[-1, 2]) < hand.min_contact_area:
+        return replace(run, status="short contact", found_by="")
+    return run
+
+
+def _is_legal(angle: float, ranges: NDArray | None) -> bool:
+    return ranges is None or bool(((angle >= ranges[:, 0] - 1e-6) & (angle <= ranges[:, 1] + 1e-6)).any())
+
+
+def _allowed(space: PlaneSpace, hand: Hand, group: GraspGroup, ranges: NDArray | None) -> list[float]:
+    """The space's angles [rad] at which the hand may be at the grasp."""
+    legal = [float(angle) for angle in space.angles if _is_legal(angle, ranges)]
+    return [angle for angle in legal if contact_area(group.grasp_class, hand, group.point, angle) >= hand.min_contact_area]
+
+
+def _along(angle: float) -> NDArray:
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def _first_free(
+    plane: GraspPlane, outline: Outline, space: PlaneSpace, angle: float, direction: NDArray, longest: float, looked_at: bool = True
+) -> tuple[NDArray, NDArray] | None:
+    """From the root's point with the hand at an angle, straight in a direction (2,), to the first node of the space that is free: the pose
+    that it begins at and the node; None if there is none within `longest` [m] or the straight motion there is not free."""
+    pose = np.append(space.root[:2], angle)
+    for back in np.arange(0.0, longest, space.step):
+        node = space.node(pose + np.append(back * direction, 0.0))
+        if (node < 0).any() or (node >= space.blocked.shape).any():
+            return None
+        if not space.blocked[tuple(node)]:
+            return (pose, node) if not looked_at or is_free(plane, outline, pose, space.poses(node)) else None
+    return None
+
+
+def _ways(
+    plane: GraspPlane, outline: Outline, space: PlaneSpace, sources: list[tuple[NDArray, NDArray]], options: MotionOptions
+) -> NDArray | None:
+    """The shortened path (k, 3) from one of the poses of `sources`, through its node, out of everything; None if there is none."""
+    if not sources:
+        return None
+    fingers = np.stack([np.cos(space.angles), np.sin(space.angles)], axis=1) @ plane.T_world_plane[2, 1:3]
+    tilts = np.arccos(np.clip(-fingers, -1.0, 1.0))
+    nodes = way_out(space, np.array([node for _, node in sources]), options.tilt_cost * tilts, options.search.out)
+    if not len(nodes):
+        return None
+    pose = next(pose for pose, node in sources if (node == nodes[0]).all())
+    return shortened(plane, outline, np.vstack([pose, space.poses(nodes)]), options.search.margin)
