@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Entry, Ledger, Value, frozen_array
 from handey_studio.geometry.transforms import apply, from_xyz_rpy
-from handey_studio.grasping.placements import Placement
 from handey_studio.grasping.solid_heights import SolidHeights, body_cells, solid_heights
 from handey_studio.world import Part, Robot, World, arm_of, hand_hulls
 from handey_studio.world.collision_bodies import TABLE_SKIN_M
@@ -86,19 +85,20 @@ class _Footprints(NamedTuple):
 def free_patches(
     world: World,
     part: Part,
-    placement: Placement,
+    T_plane_part: NDArray,
     wanted: tuple[Wanted, ...] = (),
     near: NDArray | None = None,
     options: PatchOptions = PatchOptions(),
 ) -> tuple[tuple[Patch, ...], tuple[Entry, ...]]:
-    """Poses where the part can stand in a placement, the best first, spread out, and the ledger of how many others fell for what.
+    """Poses where the part can stand as `T_plane_part` (4, 4) says, turned by any yaw, the best first and spread out, and the ledger of how
+    many others fell for what. A placement has such a pose, and each row of the grasp–placement table.
 
     The part must not be in the world. The open hand must fit around it in every `wanted` grasp, and the arm must reach it. `near` (2,) [m]
     in the world draws the patches towards it, such as where the part is now.
     """
     ground, places = _ground(world, near, options)
     yaws = np.arange(options.yaws) * 2 * np.pi / options.yaws
-    poses = [from_xyz_rpy((0, 0, 0), (0, 0, yaw)) @ placement.T_plane_part for yaw in yaws]
+    poses = [from_xyz_rpy((0, 0, 0), (0, 0, yaw)) @ T_plane_part for yaw in yaws]
     prints = _footprints(poses, part, wanted, world.robot, options)
     ledger, found = Ledger(), []
     for raised in (False, True)[: 1 + options.raised]:
@@ -183,24 +183,24 @@ def _footprints(poses: list[NDArray], part: Part, wanted: tuple[Wanted, ...], ro
     for T_plane_part in poses:
         pieces = [apply(T_plane_part, piece) for piece in part.pieces]
         boxes = [apply(T_plane_part @ want.T_part_hand, box) for want in wanted for box in hand_hulls(robot, want.opening).values()]
-        of_part = [_below(corners, options.part_gap, options) for corners in pieces]
-        of_hand = [_below(box, options.hand_gap, options) for box in boxes]
+        of_part = [_below(corners, options.part_gap, options.level, options) for corners in pieces]
+        of_hand = [_below(box, options.hand_gap, min(0.0, float(box[:, 2].min())), options) for box in boxes]
         cells.append(np.concatenate([found for found, _ in of_part + of_hand]))
         room.append(np.concatenate([found for _, found in of_part + of_hand]))
         hand.append(sum(len(found) for found, _ in of_part))
         corners = apply(T_plane_part, part.solid.vertices)
         foot = corners[corners[:, 2] < ON_PLANE_M]
-        stands_on.append(_below(np.concatenate([foot, foot + np.array([0.0, 0.0, 1e-3])]), options.cell, options)[0])
+        stands_on.append(_below(np.concatenate([foot, foot + np.array([0.0, 0.0, 1e-3])]), options.cell, 0.0, options)[0])
     first, stand_first = (np.cumsum([0] + [len(found) for found in each]) for each in (cells, stands_on))
     joined = (np.concatenate(each) for each in (cells, room, stands_on))
     return _Footprints(next(joined), next(joined), first, first[:-1] + np.array(hand), next(joined), stand_first, options.level)
 
 
-def _below(corners: NDArray, gap: float, options: PatchOptions) -> tuple[NDArray, NDArray]:
-    """Cells (m, 2) under a body, counted from the place, and how high [m] above the plane each may be filled; what lies on the plane itself
-    may stand out of it by `level`."""
+def _below(corners: NDArray, gap: float, least: float, options: PatchOptions) -> tuple[NDArray, NDArray]:
+    """Cells (m, 2) under a body, counted from the place, and how high [m] above the plane each may be filled: `least` anyway, as what lies
+    on the plane may stand out of it a little, and a hand just above it need not keep its whole gap."""
     lower, covered, lowest = body_cells(corners, np.full(2, -0.5 * options.cell), options.cell, upper=False, grown=gap)
-    return np.argwhere(covered) + lower, np.maximum(lowest[covered], options.level)
+    return np.argwhere(covered) + lower, np.maximum(lowest[covered], least)
 
 
 @njit(cache=True)

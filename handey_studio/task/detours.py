@@ -82,7 +82,7 @@ def _placed(goal: Goal, table: GraspPlacementTable, sequence: RegraspSequence, e
     wanted = tuple(_wanted(table, transfer.column) for transfer in (first, others[0]))
     near = goal.instance.T_world_part[:2, 3]
     options = PatchOptions(count=PATCHES, raised=True)
-    patches, entries = free_patches(goal.carried, table.part, placement, wanted, near, options)
+    patches, entries = free_patches(goal.carried, table.part, table.Ts_plane_part[first.target], wanted, near, options)
     ledger.adopt(entries, parent=entry)
     if not patches:
         ledger.fall(entry, "there is no free place for it")

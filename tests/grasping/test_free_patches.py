@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handey_studio.geometry import HeightField, box
-from handey_studio.geometry.transforms import apply, from_xyz_rpy
+from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse
 from handey_studio.grasping import PatchOptions, Wanted, free_patches, grasp_placement_table, stable_placements
 from handey_studio.grasping.solid_heights import body_cells, solid_heights
 from handey_studio.world import Block, Library, Part, PlacedPart, World
@@ -14,8 +14,8 @@ from handey_studio.world.support import neighbours
 LIBRARY = Library.choose()
 ROBOT = LIBRARY.robot("ur5")
 L_BLOCK = LIBRARY.part("l_block")
-FLAT = stable_placements(L_BLOCK)[0][0]
-TOP = stable_placements(LIBRARY.part("brick"))[0][0]
+FLAT = stable_placements(L_BLOCK)[0][0].T_plane_part
+TOP = stable_placements(LIBRARY.part("brick"))[0][0].T_plane_part
 T_RANGE = from_xyz_rpy((0.25, -0.25, 0.0))
 CELL = 0.005
 
@@ -78,6 +78,13 @@ def test_where_nothing_was_read_nothing_is_put():
     assert not free_patches(open_there, L_BLOCK, FLAT, (first_grasp(),))[0], "between the walls the hand has no room"
 
 
+def test_a_grasp_from_below_the_table_finds_no_patch():
+    want = first_grasp()
+    from_below = Wanted(np.array(inverse(FLAT) @ np.diag([1.0, -1.0, -1.0, 1.0]) @ FLAT @ want.T_part_hand), want.opening)
+    found, entries = free_patches(World(ROBOT), L_BLOCK, FLAT, (from_below,))
+    assert not found and {entry.reason for entry in entries} == {"something stands where the hand would"}
+
+
 @pytest.mark.parametrize("kind", ["depth map", "block", "part"])
 def test_a_level_height_will_do_if_the_table_does_not(kind):
     sharp = np.full((100, 100), 0.01)
@@ -117,7 +124,7 @@ def test_no_point_of_a_body_is_missed_by_its_cells(seed, upper):
 
 
 def test_heights_hold_all_that_stands_on_the_table():
-    placed = PlacedPart("brick#1", LIBRARY.part("brick"), from_xyz_rpy((0.4, 0.1, 0.2)) @ TOP.T_plane_part)
+    placed = PlacedPart("brick#1", LIBRARY.part("brick"), from_xyz_rpy((0.4, 0.1, 0.2)) @ TOP)
     world = World(ROBOT, parts=(placed,), terrain=scattered(5))
     ground = solid_heights(world, (-1.3, 1.3), (-0.5, 0.5), 0.01)
     assert np.isinf(ground.heights[:9]).all() and np.isfinite(ground.heights[15:-15]).all()
