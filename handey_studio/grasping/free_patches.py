@@ -13,8 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import Entry, Ledger, Value, frozen_array
-from handey_studio.geometry.transforms import apply, from_xyz_rpy
-from handey_studio.grasping.solid_heights import SolidHeights, body_cells, solid_heights
+from handey_studio.geometry.transforms import apply, from_xyz_rpy, rotate
+from handey_studio.grasping.solid_heights import SolidHeights, body_cells, body_planes, solid_heights
 from handey_studio.world import Part, Robot, World, arm_of, hand_hulls
 from handey_studio.world.collision_bodies import TABLE_SKIN_M
 
@@ -98,8 +98,9 @@ def free_patches(
     """
     ground, places = _ground(world, near, options)
     yaws = np.arange(options.yaws) * 2 * np.pi / options.yaws
-    poses = [from_xyz_rpy((0, 0, 0), (0, 0, yaw)) @ T_plane_part for yaw in yaws]
-    prints = _footprints(poses, part, wanted, world.robot, options)
+    turns = [from_xyz_rpy((0, 0, 0), (0, 0, yaw)) for yaw in yaws]
+    prints = _footprints(turns, T_plane_part, part, wanted, world.robot, options)
+    poses = [turn @ T_plane_part for turn in turns]
     ledger, found = Ledger(), []
     for raised in (False, True)[: 1 + options.raised]:
         counts = np.zeros(len(WORDS) + 1, dtype=int)
@@ -130,7 +131,7 @@ def _ground(world: World, near: NDArray | None, options: PatchOptions) -> tuple[
     x, y = ((float(base[a] - wide), float(base[a] + wide)) for a in (0, 1))
     ground = solid_heights(world, x, y, options.cell)
     step = max(1, round(options.spacing / 3 / options.cell))
-    centres = ground.centres()[::step, ::step]
+    centres = ground.centres(step)
     distance = np.linalg.norm(centres - base, axis=-1) / reach
     cost = np.abs(distance - options.best) + np.where(ground.seen[::step, ::step], 0.0, 0.5)
     if near is not None:
@@ -151,20 +152,21 @@ def _patches(
     counts: NDArray,
 ) -> Iterator[Patch]:
     """Every place that will do, at the first yaw that will, in the order of `places`; `counts` of the others grow by what spoke last."""
+    heights = ground.heights.copy()
     for start in range(0, len(places), CHUNK):
         chunk = places[start : start + CHUNK]
-        codes, levels = _fits(ground.heights.copy(), chunk, prints, world.table_z, raised)
-        centres = ground.origin + (chunk + 0.5) * ground.cell
-        for n, (x, y) in enumerate(centres):
-            code = int(codes[n].max())
+        codes, levels = _fits(heights, chunk, prints, world.table_z, raised)
+        fits = (codes == FITS).any(axis=1)
+        counts += np.bincount(codes[~fits].max(axis=1), minlength=len(counts))
+        for n in np.nonzero(fits)[0]:
+            x, y = ground.origin + (chunk[n] + 0.5) * ground.cell
             for yaw in np.nonzero(codes[n] == FITS)[0]:
                 T_world_part = from_xyz_rpy((x, y, levels[n, yaw])) @ poses[yaw]
                 if _reached(world.robot, T_world_part, wanted):
                     yield Patch(T_world_part, float(levels[n, yaw]), not raised)
                     break
-                code = OUT_OF_REACH
             else:
-                counts[code] += 1
+                counts[OUT_OF_REACH] += 1
 
 
 def _reached(robot: Robot, T_world_part: NDArray, wanted: tuple[Wanted, ...]) -> bool:
@@ -177,30 +179,42 @@ def _reached(robot: Robot, T_world_part: NDArray, wanted: tuple[Wanted, ...]) ->
     return True
 
 
-def _footprints(poses: list[NDArray], part: Part, wanted: tuple[Wanted, ...], robot: Robot, options: PatchOptions) -> _Footprints:
-    """The cells below the part and the hand around a place, which is the centre of its cell, with the part at each of `poses` (4, 4)."""
-    cells, room, hand, stands_on = [], [], [], []
-    for T_plane_part in poses:
-        pieces = [apply(T_plane_part, piece) for piece in part.pieces]
-        boxes = [apply(T_plane_part @ want.T_part_hand, box) for want in wanted for box in hand_hulls(robot, want.opening).values()]
-        of_part = [_below(corners, options.part_gap, options.level, options) for corners in pieces]
-        of_hand = [_below(box, options.hand_gap, min(0.0, float(box[:, 2].min())), options) for box in boxes]
-        cells.append(np.concatenate([found for found, _ in of_part + of_hand]))
-        room.append(np.concatenate([found for _, found in of_part + of_hand]))
-        hand.append(sum(len(found) for found, _ in of_part))
-        corners = apply(T_plane_part, part.solid.vertices)
-        foot = corners[corners[:, 2] < ON_PLANE_M]
-        stands_on.append(_below(np.concatenate([foot, foot + np.array([0.0, 0.0, 1e-3])]), options.cell, 0.0, options)[0])
+class _Body(NamedTuple):
+    """A convex body at yaw 0: corners (n, 3), planes (m, 4), how much it is grown [m], and how high [m] above the plane a cell below it may
+    be filled anyway: what lies on the plane may stand out of it a little, and a hand just above it need not keep its whole gap."""
+
+    corners: NDArray
+    planes: NDArray
+    grown: float
+    least: float
+
+
+def _footprints(
+    turns: list[NDArray], T_plane_part: NDArray, part: Part, wanted: tuple[Wanted, ...], robot: Robot, options: PatchOptions
+) -> _Footprints:
+    """The cells below the part and the hand around a place, which is the centre of its cell, for each of the turns (4, 4) about it."""
+    pieces = [apply(T_plane_part, piece) for piece in part.pieces]
+    boxes = [apply(T_plane_part @ want.T_part_hand, box) for want in wanted for box in hand_hulls(robot, want.opening).values()]
+    bodies = [_Body(piece, body_planes(piece), options.part_gap, options.level) for piece in pieces]
+    bodies += [_Body(box, body_planes(box), options.hand_gap, min(0.0, float(box[:, 2].min()))) for box in boxes]
+    corners = apply(T_plane_part, part.solid.vertices)
+    foot = corners[corners[:, 2] < ON_PLANE_M]
+    foot = np.concatenate([foot, foot + np.array([0.0, 0.0, 1e-3])])
+    stand = _Body(foot, body_planes(foot), options.cell, 0.0)
+    below = [[_below(body, turn, options.cell) for body in bodies] for turn in turns]
+    cells, room = ([np.concatenate([found[k] for found in each]) for each in below] for k in (0, 1))
+    hand = np.array([sum(len(found) for found, _ in each[: len(pieces)]) for each in below])
+    stands_on = [_below(stand, turn, options.cell)[0] for turn in turns]
     first, stand_first = (np.cumsum([0] + [len(found) for found in each]) for each in (cells, stands_on))
     joined = (np.concatenate(each) for each in (cells, room, stands_on))
-    return _Footprints(next(joined), next(joined), first, first[:-1] + np.array(hand), next(joined), stand_first, options.level)
+    return _Footprints(next(joined), next(joined), first, first[:-1] + hand, next(joined), stand_first, options.level)
 
 
-def _below(corners: NDArray, gap: float, least: float, options: PatchOptions) -> tuple[NDArray, NDArray]:
-    """Cells (m, 2) under a body, counted from the place, and how high [m] above the plane each may be filled: `least` anyway, as what lies
-    on the plane may stand out of it a little, and a hand just above it need not keep its whole gap."""
-    lower, covered, lowest = body_cells(corners, np.full(2, -0.5 * options.cell), options.cell, upper=False, grown=gap)
-    return np.argwhere(covered) + lower, np.maximum(lowest[covered], least)
+def _below(body: _Body, turn: NDArray, cell: float) -> tuple[NDArray, NDArray]:
+    """Cells (m, 2) under a body turned about the place, counted from it, and how high [m] above the plane each may be filled."""
+    planes = np.c_[rotate(turn, body.planes[:, :3]), body.planes[:, 3]]
+    lower, covered, lowest = body_cells(apply(turn, body.corners), planes, np.full(2, -0.5 * cell), cell, upper=False, grown=body.grown)
+    return np.argwhere(covered) + lower, np.maximum(lowest[covered], body.least)
 
 
 @njit(cache=True)

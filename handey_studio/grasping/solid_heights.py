@@ -32,10 +32,10 @@ class SolidHeights(Value):
         object.__setattr__(self, "heights", frozen_array(self.heights))
         object.__setattr__(self, "seen", frozen_array(self.seen, bool))
 
-    def centres(self) -> NDArray:
-        """World x, y [m] of all cells' centres (nx, ny, 2)."""
-        i, k = np.meshgrid(*(np.arange(n) for n in self.heights.shape), indexing="ij")
-        return self.origin + (np.stack([i, k], axis=-1) + 0.5) * self.cell
+    def centres(self, step: int) -> NDArray:
+        """World x, y [m] of the centres (a, b, 2) of every `step`-th cell."""
+        x, y = (low + (np.arange(0, n, step) + 0.5) * self.cell for low, n in zip(self.origin, self.heights.shape, strict=True))
+        return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
 
 
 @lru_cache(maxsize=8)
@@ -50,7 +50,7 @@ def solid_heights(world: World, x: tuple[float, float], y: tuple[float, float], 
     if world.terrain is not None:
         _raise_terrain(heights, seen, world.terrain, world, origin, cell)
     for _, corners in solids_of(world)[len(slabs_of(world)) :]:
-        lower, covered, top = body_cells(corners, origin, cell, upper=True)
+        lower, covered, top = body_cells(corners, body_planes(corners), origin, cell, upper=True)
         i0, k0 = np.maximum(lower, 0)
         i1, k1 = np.minimum(lower + covered.shape, shape)
         if i1 > i0 and k1 > k0:
@@ -78,31 +78,30 @@ def _raise_terrain(heights: NDArray, seen: NDArray, terrain: HeightField, world:
         seen[at[:, 0], at[:, 1]] = True
 
 
-def body_cells(corners: NDArray, origin: NDArray, cell: float, upper: bool, grown: float = 0.0) -> tuple[NDArray, NDArray, NDArray]:
-    """A convex body of corners (n, 3) [m], grown by `grown` [m] to all sides, over the cells of a grid.
+def body_planes(corners: NDArray) -> NDArray:
+    """Planes (m, 4) around a convex body of corners (n, 3), n·p + offset ≤ 0 inside: its faces', and upright ones around its outline as
+    it is seen from above."""
+    flat = ConvexHull(corners[:, :2]).equations
+    outline = np.c_[flat[:, :2], np.zeros(len(flat)), flat[:, 2]]
+    return np.unique(np.round(np.concatenate([ConvexHull(corners).equations, outline]), 10), axis=0)
+
+
+def body_cells(
+    corners: NDArray, planes: NDArray, origin: NDArray, cell: float, upper: bool, grown: float = 0.0
+) -> tuple[NDArray, NDArray, NDArray]:
+    """A convex body of corners (n, 3) [m] and planes (m, 4), grown by `grown` [m] to all sides, over the cells of a grid.
 
     The first cell (2,) of a window, which of its cells (a, b) the body covers, and how high it reaches (`upper`), or else how low it hangs,
     over each. On the safe side: the body counts as covering a cell that it may just miss, and as a little higher or lower than it is.
     """
-    hull = ConvexHull(corners)
     lower = np.floor((corners[:, :2].min(axis=0) - grown - origin) / cell).astype(int)
     count = np.floor((corners[:, :2].max(axis=0) + grown - origin) / cell).astype(int) + 1 - lower
-    axes = [origin[a] + (lower[a] + np.arange(count[a]) + 0.5) * cell for a in (0, 1)]
-    x, y = np.meshgrid(*axes, indexing="ij")
+    x, y = (origin[a] + (lower[a] + np.arange(count[a]) + 0.5) * cell for a in (0, 1))
     sign = 1.0 if upper else -1.0
-    limit = np.full(x.shape, (sign * corners[:, 2]).max() + grown)
-    covered = np.ones(x.shape, dtype=bool)
-    planes = np.concatenate([hull.equations, _outline_planes(corners)])
-    for nx, ny, nz, offset in planes:
-        reach = offset - grown - 0.5 * cell * (abs(nx) + abs(ny)) + nx * x + ny * y  # the least of n·p + offset over the cell, less nz·z
-        if sign * nz > LEVEL_NORMAL:
-            limit = np.minimum(limit, -reach / (sign * nz))
-        elif abs(nz) <= LEVEL_NORMAL:
-            covered &= reach <= ROUNDING_M
-    return lower, covered, sign * limit
-
-
-def _outline_planes(corners: NDArray) -> NDArray:
-    """Upright planes (m, 4) around a body as it is seen from above."""
-    flat = ConvexHull(corners[:, :2]).equations
-    return np.c_[flat[:, :2], np.zeros(len(flat)), flat[:, 2]]
+    # The least of n·p + offset over each cell, less its share of z.
+    reaches = planes[:, 3] - grown - 0.5 * cell * np.abs(planes[:, :2]).sum(axis=1)
+    reaches = reaches[:, None, None] + planes[:, 0, None, None] * x[:, None] + planes[:, 1, None, None] * y
+    facing, upright = sign * planes[:, 2] > LEVEL_NORMAL, np.abs(planes[:, 2]) <= LEVEL_NORMAL
+    limit = (-reaches[facing] / (sign * planes[facing, 2])[:, None, None]).min(axis=0)
+    covered = (reaches[upright] <= ROUNDING_M).all(axis=0)
+    return lower, covered, sign * np.minimum(limit, (sign * corners[:, 2]).max() + grown)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from handey_studio.geometry import HeightField, box
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse
 from handey_studio.grasping import PatchOptions, Wanted, free_patches, grasp_placement_table, stable_placements
-from handey_studio.grasping.solid_heights import body_cells, solid_heights
+from handey_studio.grasping.solid_heights import body_cells, body_planes, solid_heights
 from handey_studio.world import Block, Library, Part, PlacedPart, World
 from handey_studio.world.collision import collision_model
 from handey_studio.world.support import neighbours
@@ -115,7 +115,7 @@ def test_a_level_height_will_do_if_the_table_does_not(kind):
 def test_no_point_of_a_body_is_missed_by_its_cells(seed, upper):
     rng = np.random.default_rng(seed)
     corners = rng.normal(size=(8, 3)) * 0.03
-    lower, covered, limit = body_cells(corners, np.zeros(2), 0.005, upper)
+    lower, covered, limit = body_cells(corners, body_planes(corners), np.zeros(2), 0.005, upper)
     points = rng.dirichlet(np.full(8, 0.3), 2000) @ corners
     cells = np.floor(points[:, :2] / 0.005).astype(int) - lower
     assert covered[cells[:, 0], cells[:, 1]].all()
