@@ -132,7 +132,8 @@ def _run(
     most, m = rules.max_iterations, len(lines.vectors)
     poses, colliding, free = np.empty((most + 1, 3)), np.zeros((most, m), np.bool_), np.empty((most, 2))
     multipliers, moved_by = np.empty((most, m)), np.empty(most, np.int64)
-    poses[0], k, ended = start, 0, 2
+    poses[0, 0], poses[0, 1], poses[0, 2] = start
+    k, ended = 0, 2
     if meets(filled, outline, start, 0.0):
         ended = 3
     while ended == 2:
