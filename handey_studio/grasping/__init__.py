@@ -30,6 +30,7 @@ from handey_studio.grasping.rotations import (
     legal_rotations,
     tilt,
 )
+from handey_studio.grasping.stability import Grip, GripOptions, PadWrenches, gravity_in_hand, grip_margin, pad_wrenches
 
 __all__ = [
     "GOAL",
@@ -46,8 +47,11 @@ __all__ = [
     "GraspOptions",
     "GraspPlacementTable",
     "GraspPlane",
+    "Grip",
+    "GripOptions",
     "LegalRotations",
     "MotionOptions",
+    "PadWrenches",
     "Patch",
     "PatchOptions",
     "Placement",
@@ -68,12 +72,15 @@ __all__ = [
     "grasp_classes",
     "grasp_groups",
     "grasp_placement_table",
+    "gravity_in_hand",
+    "grip_margin",
     "hand_in_plane",
     "hand_outline",
     "legal_at",
     "legal_rotations",
     "opening_around",
     "outline_with",
+    "pad_wrenches",
     "plan_approach",
     "plan_grasp_motion",
     "plan_lowering",

@@ -109,14 +109,22 @@ def contact_areas(grasp_class: GraspClass, hand: Hand, points: NDArray, angles: 
     """Areas (k,) [m²] of contact for fingertips at points (k, 2) of the grasp plane and hand angles (k,) [rad].
 
     Of two faces it is what both fingers cover where the faces face each other. Opposite an edge or a vertex it is what the finger on the
-    face covers of it, and 0 where the other finger covers too little of the edge, or misses the vertex.
+    face covers of it evenly around that (`evenly`), and 0 where the other finger covers too little of the edge, or misses the vertex.
     """
     pads = finger_pads(hand, points, angles)
-    shared = shapely.intersection(pads, grasp_class.contact)
+    shared = np.asarray(shapely.intersection(pads, grasp_class.contact))
     if grasp_class.kind == "faces":
         return np.asarray(shapely.area(shared))
     touched = ~shapely.is_empty(shared) & (shapely.length(shared) >= grasp_class.least_length)
-    return np.where(touched, shapely.area(shapely.intersection(pads, grasp_class.surfaces[0])), 0.0)
+    areas = np.zeros(len(pads))
+    areas[touched] = shapely.area(evenly(shapely.intersection(pads[touched], grasp_class.surfaces[0]), shared[touched]))
+    return areas
+
+
+def evenly(patches: NDArray, touched: NDArray) -> NDArray:
+    """What patches (k,) of a face have on both sides alike of what is touched opposite them (k,): pressed there, they push back in line."""
+    middles = np.repeat(shapely.get_coordinates(shapely.centroid(touched)), shapely.get_num_coordinates(patches), axis=0)
+    return np.asarray(shapely.intersection(patches, shapely.transform(patches, lambda points: 2.0 * middles - points)))
 
 
 def finger_pads(hand: Hand, points: NDArray, angles: NDArray) -> NDArray:

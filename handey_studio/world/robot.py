@@ -15,6 +15,7 @@ class Hand(Value):
     The hand frame sits midway between the fingertips: z from the crosspiece towards the tips, x along the crosspiece, so
     that the fingers close along it, y across the fingers. `T_flange_hand` (4, 4) says where the arm carries it.
     The crosspiece and its mount reach from the fingers' roots back to the flange.
+    Each finger presses with `force` [N]; the friction between them is `pad_friction` times the part's own.
     """
 
     finger_length: float
@@ -29,6 +30,7 @@ class Hand(Value):
     force: float
     min_contact_area: float
     T_flange_hand: NDArray
+    pad_friction: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_hand", frozen_array(self.T_flange_hand))

@@ -53,6 +53,7 @@ OPTIONAL = {
     "base.xyz_m": NUMBERS,
     "base.rpy_deg": NUMBERS,
     "hand.mount.rpy_deg": NUMBERS,
+    "hand.pad_friction": NUMBER,
 }
 
 
@@ -173,6 +174,7 @@ def _hand(table: dict[str, Any]) -> Hand:
         force=float(table["force_N"]),
         min_contact_area=float(table["min_contact_area_mm2"]) * 1e-6,
         T_flange_hand=_transform(table["mount"]),
+        pad_friction=float(table.get("pad_friction", 1.0)),
     )
 
 
@@ -208,8 +210,8 @@ def _hand_faults(hand: Hand) -> Iterator[str]:
             f"the hand opens to {hand.opening_max:g} m on a crosspiece of {hand.crosspiece_length:g} m; "
             f"opening_max_m must not be more than crosspiece_length_m."
         )
-    if not (hand.force > 0 and hand.min_contact_area > 0):
-        yield "hand.force_N and hand.min_contact_area_mm2 must be above 0."
+    if not (hand.force > 0 and hand.min_contact_area > 0 and hand.pad_friction > 0):
+        yield "hand.force_N, hand.min_contact_area_mm2 and hand.pad_friction must be above 0."
     face = hand.finger_length * hand.finger_width
     if hand.min_contact_area > face:
         yield (
