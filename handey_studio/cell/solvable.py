@@ -40,8 +40,8 @@ STABLE_M, STABLE_RAD = 0.001, np.deg2rad(0.5)
 
 @dataclass(frozen=True)
 class SolvableOptions:
-    """Lengths in metres, angles in radians. `blocks` least and most blocks of clutter, with `sides`, dropped within `spread` of either end of
-    the motion; they stay `play` away from the known-good hand. The ends are `apart`, `inside` the scanned area."""
+    """Lengths in metres, angles in radians. `blocks` least and most blocks of clutter, with `sides`, dropped within `spread` of either
+    end of the motion; they stay `play` away from the known-good hand. The ends are `apart`, `inside` the scanned area."""
 
     blocks: tuple[int, int] = (4, 9)
     sides: tuple[float, float] = (0.015, 0.055)
@@ -143,9 +143,7 @@ def _turned_over(
     start, goal = table.legal[table.placement_of == from_kind].any(axis=0), table.legal[table.placement_of == to_kind].any(axis=0)
     if (start & goal).any():
         return None
-    costs = [
-        np.where(table.legal[row], tilts_at(table, T), np.inf) for row, T in ((from_row, T_start), (to_row, T_goal))
-    ]
+    costs = [np.where(table.legal[row], tilts_at(table, T), np.inf) for row, T in ((from_row, T_start), (to_row, T_goal))]
     for count, sequence in enumerate(sequences(table, *costs, fewest=1, most=1)):
         columns = sequence.transfers[0].column, sequence.transfers[-1].column
         hands: Hands = [
@@ -161,7 +159,10 @@ def _turned_over(
 
 def _standing(workcell: Workcell, robot: Robot, hands: Hands, clutter: Sequence[SolidBody], options: SolvableOptions) -> bool:
     """Whether the arm stands at every known-good hand pose, and straight above it, clear of everything."""
-    return all(any(_clear(workcell, robot, T @ turn, opening, here, clutter, options) for turn in (np.eye(4), TURNED)) for T, opening, here in hands)
+    return all(
+        any(_clear(workcell, robot, T @ turn, opening, here, clutter, options) for turn in (np.eye(4), TURNED))
+        for T, opening, here in hands
+    )
 
 
 TURNED = np.diag([-1.0, -1.0, 1.0, 1.0])  # the hand looks the same with its fingers swapped
@@ -206,10 +207,9 @@ def _cluttered(
         if rested.resting and _inside(workcell, block) and not _meets(block, kept_out):
             clutter.append(block)
     last = settle([*fixed, part, *clutter])
-    moved = max(max(a / STABLE_M, b / STABLE_RAD) for a, b in (
-        pose_difference(before.T_world_body, after.T_world_body) for before, after in zip([part, *clutter], last.bodies[len(fixed):], strict=True)
-    ))  # fmt: skip
-    if not last.resting or moved > 1.0:
+    pairs = zip([part, *clutter], last.bodies[len(fixed) :], strict=True)
+    moved = [pose_difference(before.T_world_body, after.T_world_body) for before, after in pairs]
+    if not last.resting or any(metres > STABLE_M or radians > STABLE_RAD for metres, radians in moved):
         return None
     good = visible_share(workcell.finder, last.bodies, last.bodies[len(fixed)]) >= options.visible
     return list(last.bodies) if good and _standing(workcell, robot, hands, clutter, options) else None
@@ -231,7 +231,7 @@ def _kept_out(robot: Robot, hands: Hands, options: SolvableOptions) -> Iterator[
 
 
 def _meets(block: SolidBody, kept_out: list[Polytope]) -> bool:
-    mine = polytopes_of(block.pieces)
+    mine = polytopes_of(block)
     return any(overlap(piece, np.eye(4), one, block.T_world_body) >= 0 for piece in kept_out for one in mine)
 
 

@@ -6,7 +6,7 @@ A command imports the rooms that it needs when it runs: together they take secon
 from handey_studio.commands import (
     bench_locate,
     bench_motion,
-    bench_piles,
+    bench_moves,
     fit_score,
     locate,
     move,
@@ -29,7 +29,7 @@ COMMANDS = (
     move,
     plan,
     path,
-    bench_piles,
+    bench_moves,
     bench_locate,
     bench_motion,
     fit_score,
