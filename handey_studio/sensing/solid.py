@@ -2,7 +2,8 @@
 
 Below a reading everything is solid. A hole, where nothing was read, is solid up to the lowest light that passed over it on its
 way to a reading elsewhere (the shadow's own slope), and never above the hole's rim. Readings that a located part explains leave
-the map with it, and only those; what it stood on stays solid up to the part's underside.
+the map with it, and only those; what it stood on stays solid up to the part's underside. With them goes the sliver of its own shadow
+that is no wider than fingers need to close on it: they close by force and tell their width, so they feel what nobody saw there.
 """
 
 from functools import lru_cache
@@ -20,6 +21,7 @@ from handey_studio.sensing.depth_map import SKY_M, DepthMap
 from handey_studio.world import Part, PlacedPart
 
 EXPLAINED_SIGMAS = 4.0  # a reading this many standard deviations from a part's surface is still the part's
+SLIVER_M = 0.006  # between a part's face and an open finger
 
 
 def solid_columns(depth_map: DepthMap) -> HeightField:
@@ -66,7 +68,7 @@ def _explained(depth_map: DepthMap, placed: PlacedPart) -> tuple[NDArray, NDArra
     footprint, underside = _underside(depth_map, apply(T_range_part, placed.part.solid.vertices), placed.part.solid.triangles)
     if not footprint.any():
         return footprint, underside
-    reach = int(np.ceil(tolerance / depth_map.cell))
+    reach = int(np.ceil(max(tolerance, SLIVER_M) / depth_map.cell))
     near = ndimage.binary_dilation(footprint, ndimage.generate_binary_structure(2, 2), iterations=reach + 1)
     nearest: Any = ndimage.distance_transform_edt(~footprint, return_distances=False, return_indices=True)
     underside = underside[nearest[0], nearest[1]]
@@ -78,7 +80,9 @@ def _explained(depth_map: DepthMap, placed: PlacedPart) -> tuple[NDArray, NDArra
     points = np.c_[cells[seen], depth_map.elevation[j[seen], i[seen]]]
     own[j[seen], i[seen]] = _outside_by(placed.part, apply(inverse(T_range_part), points)) <= tolerance
     gap: Any = ndimage.distance_transform_edt(~footprint)
-    own &= ~(np.isnan(depth_map.elevation) & (gap * depth_map.cell > tolerance))
+    top = float(apply(T_range_part, placed.part.solid.vertices)[:, 2].max())
+    sliver = np.where(depth_map.passed <= top + tolerance, SLIVER_M, tolerance)  # light that passed above the part was not its shadow's
+    own &= ~(np.isnan(depth_map.elevation) & (gap * depth_map.cell > np.maximum(sliver, tolerance)))
     return own, underside
 
 
