@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from handey_studio.grasping.bump_lines import BumpOptions, plan_approach
 from handey_studio.grasping.bump_run import BumpRun, FoundBy
-from handey_studio.grasping.classes import contact_area
+from handey_studio.grasping.classes import contact_area, contact_areas
 from handey_studio.grasping.grasp_plane import GraspPlane
 from handey_studio.grasping.groups import GraspGroup
 from handey_studio.grasping.hand_outline import Outline, hand_outline
@@ -135,8 +135,9 @@ def _is_legal(angle: float, ranges: NDArray | None) -> bool:
 
 def _allowed(space: PlaneSpace, hand: Hand, group: GraspGroup, ranges: NDArray | None) -> list[float]:
     """The space's angles [rad] at which the hand may be at the grasp."""
-    legal = [float(angle) for angle in space.angles if _is_legal(angle, ranges)]
-    return [angle for angle in legal if contact_area(group.grasp_class, hand, group.point, angle) >= hand.min_contact_area]
+    areas = contact_areas(group.grasp_class, hand, np.tile(group.point, (len(space.angles), 1)), space.angles)
+    enough = areas >= hand.min_contact_area
+    return [float(angle) for angle, touches in zip(space.angles, enough, strict=True) if touches and _is_legal(angle, ranges)]
 
 
 def _along(angle: float) -> NDArray:

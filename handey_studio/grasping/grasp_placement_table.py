@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.transforms import inverse
-from handey_studio.grasping.classes import contact_area, hand_in_plane, opening_around
+from handey_studio.grasping.classes import contact_areas, hand_in_plane, opening_around
 from handey_studio.grasping.groups import GraspGroup, grasp_groups
 from handey_studio.grasping.placements import Placement, PlacementOptions, stable_placements
 from handey_studio.grasping.rotations import HAND_MARGIN_M, GraspEnd, tilt
@@ -115,7 +115,7 @@ def grasp_placement_table(part: Part, hand: Hand, options: TableOptions = TableO
         np.array([angle for _, angle in columns]),
         Ts_part_hand,
         openings,
-        np.array([contact_area(groups[g].grasp_class, hand, groups[g].point, angle) for g, angle in columns]),
+        np.concatenate([np.empty(0), *(_areas(group, hand, group.angle + offsets) for group in groups)]),
         _gaps(part, hand, Ts_part_hand, openings),
         heights,
         tilts,
@@ -140,6 +140,11 @@ def tilts_at(table: GraspPlacementTable, T_world_part: NDArray) -> NDArray:
 def _hand_at(group: GraspGroup, angle: float) -> NDArray:
     """T_part_hand (4, 4)."""
     return group.grasp_class.T_part_plane @ hand_in_plane(group.point, angle, 1)
+
+
+def _areas(group: GraspGroup, hand: Hand, angles: NDArray) -> NDArray:
+    """Areas (k,) [m²] of contact at each hand angle."""
+    return contact_areas(group.grasp_class, hand, np.tile(group.point, (len(angles), 1)), angles)
 
 
 def _hand_corners(hand: Hand, openings: NDArray) -> NDArray:
