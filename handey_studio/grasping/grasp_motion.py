@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +58,8 @@ def plan_grasp_motion(
     space = plane_space(plane, outline, np.array([*group.point, angle]), options.search)
     path, allowed = None, _allowed(space, hand, group, ranges)
     for angles in ([a for a in allowed if a == space.root[2]], allowed):
-        sources = [_first_free(plane, outline, space, a, -_along(a), options.search.out) for a in angles]
-        path = _ways(plane, outline, space, [found for found in sources if found is not None], options) if path is None else path
+        sources = [found for a in angles for found in _source(plane, outline, space, a, -_along(a), options.search.out)]
+        path = _ways(plane, outline, space, sources, options) if path is None else path
     if path is None:
         return replace(nearest, status="no way") if nearest.status != "short contact" else nearest
     return replace(nearest, path=path[::-1], status="reached", distance=0.0, found_by="plane search")
@@ -68,7 +69,7 @@ def plan_retreat(plane: GraspPlane, hand: Hand, pose: NDArray, options: MotionOp
     """The way out of a grasp from a pose (y, z, angle) of the open hand among what stands around the putdown: the reverse of the way in.
 
     Straight back along the fingers if that is free, else led by bump lines to one of the places where a way in might start, else by search.
-    The path begins at the pose; `goal` is where it was to lead.
+    The path begins at the pose, which is taken for free; `goal` is where it was to lead.
     """
     outline, pose = hand_outline(hand), np.array(pose, dtype=float)
     (out, _), *others = _starts(pose, 0.0, options)
@@ -77,15 +78,15 @@ def plan_retreat(plane: GraspPlane, hand: Hand, pose: NDArray, options: MotionOp
         return BumpRun(plane, path, out[:2], "reached", 0.0, options.bumps.threshold, "straight back")
     nearest = plan_approach(plane, hand, pose, out[:2], options.bumps)
     for target, _ in others:
-        if nearest.status in ("reached", "blocked start"):
+        if nearest.status != "stuck":
             break
         run = plan_approach(plane, hand, pose, target[:2], options.bumps)
         nearest = run if run.status == "reached" else nearest
-    if nearest.status in ("reached", "blocked start"):
+    if nearest.status == "reached":
         return replace(nearest, path=shortened(plane, outline, nearest.path, options.search.margin))
     space = plane_space(plane, outline, pose, options.search)
-    source = _first_free(plane, outline, space, pose[2], -_along(pose[2]), options.search.out)
-    path = _ways(plane, outline, space, [source] if source is not None else [], options)
+    source = _source(plane, outline, space, pose[2], -_along(pose[2]), options.search.out)
+    path = _ways(plane, outline, space, source, options)
     if path is None:
         return replace(nearest, status="no way")
     return replace(nearest, path=path, goal=path[-1, :2], status="reached", distance=0.0, found_by="plane search")
@@ -102,8 +103,8 @@ def plan_lowering(plane: GraspPlane, outline: Outline, pose: NDArray, options: M
     space = plane_space(plane, outline, pose, options.search)
     up, back = plane.T_world_plane[2, 1:3], -_along(pose[2])
     directions = [direction / max(float(np.linalg.norm(direction)), 1e-9) for direction in (up, up + back, back)]
-    found = [_first_free(plane, outline, space, pose[2], d, options.last_bit, looked_at=False) for d in directions]
-    path = _ways(plane, outline, space, [nodes for nodes in found if nodes is not None], options)
+    sources = [found for d in directions for found in _source(plane, outline, space, pose[2], d, options.last_bit, looked_at=False)]
+    path = _ways(plane, outline, space, sources, options)
     if path is None:
         return BumpRun(plane, pose[None], pose[:2], "no way", options.search.out, options.bumps.threshold)
     return BumpRun(plane, path[::-1], pose[:2], "reached", 0.0, options.bumps.threshold, "plane search")
@@ -144,31 +145,40 @@ def _along(angle: float) -> NDArray:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def _first_free(
+class _Source(NamedTuple):
+    """Where a search begins: the pose (3,) of the hand at the grasp, where it has come to straight from there, and the node (3,) there."""
+
+    pose: NDArray
+    backed: NDArray
+    node: NDArray
+
+
+def _source(
     plane: GraspPlane, outline: Outline, space: PlaneSpace, angle: float, direction: NDArray, longest: float, looked_at: bool = True
-) -> tuple[NDArray, NDArray] | None:
-    """From the root's point with the hand at an angle, straight in a direction (2,), to the first node of the space that is free: the pose
-    that it begins at and the node; None if there is none within `longest` [m] or the straight motion there is not free."""
+) -> list[_Source]:
+    """From the root's point with the hand at an angle, straight in a direction (2,), to the first node of the space that is free; none if
+    there is none within `longest` [m], or if the straight motion there is surely blocked: by more than a cell, as the hand may stand nearer
+    to something than the cells can tell."""
     pose = np.append(space.root[:2], angle)
     for back in np.arange(0.0, longest, space.step):
-        node = space.node(pose + np.append(back * direction, 0.0))
+        backed = pose + np.append(back * direction, 0.0)
+        node = space.node(backed)
         if (node < 0).any() or (node >= space.blocked.shape).any():
-            return None
+            return []
         if not space.blocked[tuple(node)]:
-            return (pose, node) if not looked_at or is_free(plane, outline, pose, space.poses(node)) else None
-    return None
+            free = not looked_at or is_free(plane, outline, pose, backed, -plane.cell)
+            return [_Source(pose, backed, node)] if free else []
+    return []
 
 
-def _ways(
-    plane: GraspPlane, outline: Outline, space: PlaneSpace, sources: list[tuple[NDArray, NDArray]], options: MotionOptions
-) -> NDArray | None:
-    """The shortened path (k, 3) from one of the poses of `sources`, through its node, out of everything; None if there is none."""
+def _ways(plane: GraspPlane, outline: Outline, space: PlaneSpace, sources: list[_Source], options: MotionOptions) -> NDArray | None:
+    """The shortened path (k, 3) from one of the sources out of everything; None if there is none."""
     if not sources:
         return None
     fingers = np.stack([np.cos(space.angles), np.sin(space.angles)], axis=1) @ plane.T_world_plane[2, 1:3]
     tilts = np.arccos(np.clip(-fingers, -1.0, 1.0))
-    nodes = way_out(space, np.array([node for _, node in sources]), options.tilt_cost * tilts, options.search.out)
+    nodes = way_out(space, np.array([source.node for source in sources]), options.tilt_cost * tilts, options.search.out)
     if not len(nodes):
         return None
-    pose = next(pose for pose, node in sources if (node == nodes[0]).all())
-    return shortened(plane, outline, np.vstack([pose, space.poses(nodes)]), options.search.margin)
+    first = next(source for source in sources if (source.node == nodes[0]).all())
+    return shortened(plane, outline, np.vstack([first.pose, first.backed, space.poses(nodes)]), options.search.margin)

@@ -165,6 +165,19 @@ def test_walled_in_there_is_no_way_and_it_says_so():
     assert plan_retreat(plane, HAND, ROOT).status == "no way"
 
 
+def test_a_hand_that_stands_nearer_to_something_than_a_cell_gets_in_and_out():
+    """Walls beside the fingers whose cells reach into the hand's outline, though the walls themselves may not."""
+    plane = plane_of(filled_at((-0.20, -0.0095, -0.05, 0.03), (0.0095, 0.20, -0.05, 0.03)), empty())
+    assert overlaps(plane, hand_outline(HAND), ROOT)
+    run, out = plan_grasp_motion(plane, HAND, GROUP, GROUP.angle), plan_retreat(plane, HAND, ROOT)
+    assert run.status == out.status == "reached" and run.found_by == out.found_by == "plane search"
+    assert np.allclose(run.path[-1], ROOT) and np.allclose(out.path[0], ROOT)
+    for path in (run.path, out.path):
+        assert never_overlaps(plane, path, -CELL_M)
+        tight = np.linalg.norm(path[:, :2] - ROOT[:2], axis=1) < 0.025
+        assert np.allclose((path[tight, :2] - GROUP.point) @ np.array([-ALONG[1], ALONG[0]]), 0.0, atol=1e-3)
+
+
 def test_a_way_ends_at_a_legal_angle_with_enough_contact():
     plane = plane_of(filled_at((0.012, 0.06, 0.02, 0.1)))
     for low, high in ((-0.05, 0.05), (-0.6, 0.6)):
