@@ -65,9 +65,9 @@ def run(given: argparse.Namespace) -> int:
         return NOTHING_FOUND
     for pose in result.poses:
         x, y, z = pose.T_world_part[:3, 3]
-        print(
-            f"{pose.part} at {x:.4f}, {y:.4f}, {z:.4f} m, score {pose.score:.2f}, {pose.edges_found} of {pose.edges_predicted} edges found"
-        )
+        seen = f"score {pose.score:.2f}, {pose.edges_found} of {pose.edges_predicted} edges found"
+        others = "; could also be " + ", ".join(f"{r.part} ({r.probability:.2f})" for r in pose.rivals) if pose.rivals else ""
+        print(f"{pose.part} at {x:.4f}, {y:.4f}, {z:.4f} m, {seen}{others}")
     return DONE
 
 

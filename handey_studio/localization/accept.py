@@ -1,104 +1,169 @@
-"""Accept: what is probable by itself, then what explains the view jointly."""
+"""Accept: what is probable beside its rivals, then what explains the view jointly."""
 
 import time
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from handey_studio.localization.candidates import Candidate
-from handey_studio.localization.joint import explain_jointly
-from handey_studio.localization.result import Hypothesis, LocatedPose, pose_matrix
+from handey_studio.localization.joint import SAME_READINGS, Rivals, explain_jointly, probabilities, rivals_among
+from handey_studio.localization.result import Hypothesis, LocatedPose, Rival, pose_matrix
 from handey_studio.localization.search import Search
 
 MOST_RIVALS = 60  # candidates that are weighed against one another
+RIVAL_FROM, TOLD_FROM = 0.01, 0.05  # how probable a pose must be alone to count as a rival, and beside the others to be told as one
 SURE = 1.0 - 1e-9  # no view makes a pose more probable than this
+OUTDONE = "another pose explains its readings better"
 
 
 class Fall(NamedTuple):
-    """Why a candidate fell, with the number and the limit."""
+    """Why a candidate fell, with the number and the limit, and the number of the candidate that stands in its place, if one does."""
 
     reason: str
     value: float
     limit: float
-    unit: str
+    unit: str = ""
+    to: int | None = None
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """Candidates, the `numbers` of those that were weighed against one another, why two of these cannot both stand (`rivals`, by their
+    places in `numbers`), and the `probability` of every candidate."""
+
+    candidates: list[Candidate]
+    numbers: list[int]
+    rivals: Rivals
+    probability: list[float]
+
+    def against(self, n: int) -> list[int]:
+        """The candidates that claim the same readings as number n, the most probable first."""
+        pairs = [(self.numbers[a], self.numbers[b]) for (a, b), rivalry in self.rivals.items() if rivalry.reason == SAME_READINGS]
+        others = [b if a == n else a for a, b in pairs if n in (a, b)]
+        return sorted(others, key=lambda k: -self.probability[k])
 
 
 def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPose], list[Hypothesis]]:
     """The poses that stand, most probable first, and every candidate with why it fell: the accepted first, then by probability."""
     start = time.perf_counter()
     falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _objection(search, candidate)) is not None}
-    accepted = [candidates[n] for n in _jointly(search, candidates, falls)]
-    for n, fall in sorted(falls.items()):
-        search.ledger.fall(candidates[n].entry, fall.reason, value=fall.value, limit=fall.limit, unit=fall.unit)
-    rejected = sorted(falls, key=lambda n: -candidates[n].score.probability)
-    poses = [_located(search, candidate) for candidate in accepted]
-    hypotheses = [_hypothesis(search, candidate, None) for candidate in accepted]
-    hypotheses += [_hypothesis(search, candidates[n], falls[n].reason) for n in rejected]
+    weighing = _weighed(search, candidates, falls)
+    falls |= {
+        n: _improbable(search, weighing, n) for n, p in enumerate(weighing.probability) if p < search.options.min_score and n not in falls
+    }
+    accepted = _jointly(search, weighing, falls)
+    _write_down(search, candidates, falls)
+    rejected = sorted(falls, key=lambda n: -weighing.probability[n])
+    poses = [_located(search, weighing, n) for n in accepted]
+    hypotheses = [_hypothesis(search, weighing, n, None) for n in accepted]
+    hypotheses += [_hypothesis(search, weighing, n, falls[n].reason) for n in rejected]
     search.timing["accept"] = time.perf_counter() - start
-    return sorted(poses, key=lambda pose: -pose.score), hypotheses
+    return poses, hypotheses
 
 
-def _jointly(search: Search, candidates: list[Candidate], falls: dict[int, Fall]) -> list[int]:
+def _objection(search: Search, candidate: Candidate) -> Fall | None:
+    """The first thing that rules a candidate out by itself."""
+    options, allowed = search.options, 4.0 * search.slack
+    if candidate.below > allowed:
+        return Fall("it would stand below the table", candidate.below, allowed, "m")
+    visible = float(candidate.verdict.visible_fraction[0])
+    if visible < options.min_visible_fraction:
+        return Fall("too little of it is seen", visible, options.min_visible_fraction)
+    return None
+
+
+def _weighed(search: Search, candidates: list[Candidate], falls: dict[int, Fall]) -> Weighing:
+    """How probable each candidate is beside those that nothing rules out."""
+    alone = [candidate.score.probability for candidate in candidates]
+    numbers = sorted((n for n, p in enumerate(alone) if n not in falls and p >= RIVAL_FROM), key=lambda n: -alone[n])[:MOST_RIVALS]
+    rivals = rivals_among(search, [candidates[n] for n in numbers])
+    probability = alone.copy()
+    for n, p in zip(numbers, probabilities(np.array([candidates[n].score.odds for n in numbers]), rivals), strict=True):
+        probability[n] = float(p)
+    return Weighing(candidates, numbers, rivals, probability)
+
+
+def _improbable(search: Search, weighing: Weighing, n: int) -> Fall:
+    """Why candidate n is too improbable: because of its rivals, or by itself."""
+    candidate, p, limit = weighing.candidates[n], weighing.probability[n], search.options.min_score
+    if candidate.score.probability >= limit:
+        return Fall(OUTDONE, p, limit, to=weighing.against(n)[0])
+    return Fall(f"improbable, above all as {candidate.score.doubt}", p, limit)
+
+
+def _jointly(search: Search, weighing: Weighing, falls: dict[int, Fall]) -> list[int]:
     """Numbers of the candidates that stand together, most probable first; the others are added to `falls`."""
-    ranked = sorted((n for n in range(len(candidates)) if n not in falls), key=lambda n: -candidates[n].score.probability)
-    falls.update({n: Fall("too many better poses", k, MOST_RIVALS, "") for k, n in enumerate(ranked) if k >= MOST_RIVALS})
-    standing = ranked[:MOST_RIVALS]
+    probability, places = weighing.probability, [k for k, n in enumerate(weighing.numbers) if n not in falls]
+    falls.update(
+        {
+            n: Fall("too many better poses", len(places), MOST_RIVALS)
+            for n in set(range(len(probability))) - set(weighing.numbers) - set(falls)
+        }
+    )
+    standing, at = [weighing.numbers[k] for k in places], {k: m for m, k in enumerate(places)}
+    rivals = {(at[a], at[b]): rivalry for (a, b), rivalry in weighing.rivals.items() if a in at and b in at}
     # How much more probable the view is with a pose than without any: of two that exclude each other the more probable one stands.
-    worth = [-float(np.log1p(-min(candidates[n].score.probability, SURE))) for n in standing]
-    joint = explain_jointly(search, [candidates[n] for n in standing], worth)
-    falls.update({standing[k]: Fall(*rivalry) for k, rivalry in joint.fell.items()})
+    joint = explain_jointly([-float(np.log1p(-min(probability[n], SURE))) for n in standing], rivals)
+    for k, (better, rivalry) in joint.fell.items():
+        falls[standing[k]] = Fall(*rivalry, to=standing[better])
     chosen = []
     count: dict[str, int] = {}
-    for n in sorted((standing[k] for k in joint.chosen), key=lambda n: -candidates[n].score.probability):
-        name = candidates[n].part.name
+    for n in sorted((standing[k] for k in joint.chosen), key=lambda n: -probability[n]):
+        name = weighing.candidates[n].part.name
         count[name] = count.get(name, 0) + 1
         if count[name] > search.options.max_poses:
-            falls[n] = Fall("as many poses as asked for were found", count[name], search.options.max_poses, "")
+            falls[n] = Fall("as many poses as asked for were found", count[name], search.options.max_poses)
         else:
             chosen.append(n)
     return chosen
 
 
-def _objection(search: Search, candidate: Candidate) -> Fall | None:
-    """The first thing that speaks against a candidate by itself."""
-    options, verdict = search.options, candidate.verdict
-    allowed = 4.0 * search.slack
-    if candidate.below > allowed:
-        return Fall("it would stand below the table", candidate.below, allowed, "m")
-    if verdict.visible_fraction[0] < options.min_visible_fraction:
-        return Fall("too little of it is seen", float(verdict.visible_fraction[0]), options.min_visible_fraction, "")
-    if candidate.score.probability < options.min_score:
-        return Fall(f"improbable, above all as {candidate.score.doubt}", candidate.score.probability, options.min_score, "")
-    return None
+def _write_down(search: Search, candidates: list[Candidate], falls: dict[int, Fall]) -> None:
+    """The falls in the ledger; one that fell to another names that one's option."""
+    options = [entry.option for entry in search.ledger.entries]
+    for n, fall in sorted(falls.items()):
+        better = () if fall.to is None else (options[candidates[fall.to].entry],)
+        search.ledger.fall(candidates[n].entry, fall.reason, value=fall.value, limit=fall.limit, unit=fall.unit, bodies=better)
 
 
-def _located(search: Search, candidate: Candidate) -> LocatedPose:
+def _rivals(search: Search, weighing: Weighing, n: int) -> tuple[Rival, ...]:
+    """What else the readings of candidate n could be."""
+    told = [(weighing.candidates[k], weighing.probability[k]) for k in weighing.against(n) if weighing.probability[k] >= TOLD_FROM]
+    return tuple(Rival(c.part.name, search.view.T_world_sensor @ pose_matrix(c.R, c.t), p) for c, p in told)
+
+
+def _located(search: Search, weighing: Weighing, n: int) -> LocatedPose:
+    candidate = weighing.candidates[n]
     T, verdict = pose_matrix(candidate.R, candidate.t), candidate.verdict
     return LocatedPose(
         candidate.part.name,
         search.view.T_world_sensor @ T,
         T,
-        candidate.score.probability,
+        weighing.probability[n],
         int(verdict.predicted[0]),
         int(verdict.edges[0]),
         float(verdict.visible_fraction[0]),
         candidate.rms,
         candidate.margin,
         candidate.sigma,
+        _rivals(search, weighing, n),
     )
 
 
-def _hypothesis(search: Search, candidate: Candidate, reason: str | None) -> Hypothesis:
+def _hypothesis(search: Search, weighing: Weighing, n: int, reason: str | None) -> Hypothesis:
+    candidate = weighing.candidates[n]
     T_world_part = search.view.T_world_sensor @ pose_matrix(candidate.R, candidate.t)
     found, missing = float(candidate.verdict.found[0]), float(candidate.verdict.missing[0])
     return Hypothesis(
         candidate.part.name,
         T_world_part,
-        candidate.score.probability,
+        weighing.probability[n],
         found,
         missing,
         candidate.data,
         reason,
         candidate.model,
         candidate.entry,
+        _rivals(search, weighing, n) if reason is None else (),
     )

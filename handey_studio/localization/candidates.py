@@ -1,6 +1,7 @@
 """Candidates: the poses of one part that edge pairs propose, verified roughly, told apart, refined and verified again (Handey 1987 §3)."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from handey_studio.base import Value, frozen_array
 from handey_studio.localization.distinct import distinct, probe_points
 from handey_studio.localization.hypotheses import FELL, Assignments, hypothesize, hypothesize_parallel, hypothesize_single, joined
 from handey_studio.localization.pairs import data_lines, data_pairs, data_parallels, model_edges, model_pairs, model_parallels
+from handey_studio.localization.promise import FITTED, promise_features
 from handey_studio.localization.refine import Refined, refine
 from handey_studio.localization.samples import DENSER, part_samples, thinned
 from handey_studio.localization.score import Rated, Score, scores
@@ -23,8 +25,11 @@ SAME_SHARE = 0.04  # of a part's diameter: hypotheses nearer than this are one
 EVERY = 6  # samples that the first verification looks at: one in so many
 FIRST_STEPS, LAST_STEPS = 4, 8  # of refinement, with few samples over rough limits, and with all over tight ones
 MOST_A_PLACE = 20  # hypotheses refined of those whose middles lie together
-MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE = 40, 4
+MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE = 32, 4
 MOST_POLISHED, POLISHED_FROM = 12, 0.01  # poses refined from all readings, and how probable they must be
+
+
+Watch = Callable[[str, NDArray, NDArray, NDArray], None]  # is shown "rough" or "refined" poses R, t and their features of promise
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +58,8 @@ class Candidate(Value):
         object.__setattr__(self, "t", frozen_array(self.t))
 
 
-def candidates_of(search: Search, part: Part) -> list[Candidate]:
-    """Distinct refined poses of one part, most probable first."""
+def candidates_of(search: Search, part: Part, watch: Watch | None = None) -> list[Candidate]:
+    """Distinct refined poses of one part, most probable first. `watch` is shown all that were ranked on the way."""
     start = time.perf_counter()
     found = _hypotheses(search, part)
     search.timing["hypothesize"] += time.perf_counter() - start
@@ -67,11 +72,14 @@ def candidates_of(search: Search, part: Part) -> list[Candidate]:
     if not len(found.t):
         return []
     verdict = verify(found.R, found.t, part_samples(part), search.evidence, search.rough, EVERY)
-    order = np.argsort(-verdict.support, kind="stable")
+    promise = promise_features(search, part, found.R, found.t, verdict)
+    if watch is not None:
+        watch("rough", found.R, found.t, promise)
+    order = np.argsort(-(promise @ FITTED.rough), kind="stable")
     kept = distinct(found.R, found.t, order, part, _apart(search, part), search.options.max_refined, MOST_A_PLACE)
     search.timing["verify"] += time.perf_counter() - start
     start = time.perf_counter()
-    made = _refined(search, part, found.rows(kept))
+    made = _refined(search, part, found.rows(kept), watch)
     search.timing["refine"] += time.perf_counter() - start
     entries = [search.ledger.add("verify", f"{part.name} from {_origin(c.data)}", parent=parent) for c in made]
     return [replace(candidate, entry=entry) for candidate, entry in zip(made, entries, strict=True)]
@@ -111,14 +119,18 @@ def _hypotheses(search: Search, part: Part) -> Assignments:
     return found._replace(data=numbers[found.data])
 
 
-def _refined(search: Search, part: Part, found: Assignments) -> list[Candidate]:
+def _refined(search: Search, part: Part, found: Assignments, watch: Watch | None) -> list[Candidate]:
     """Poses refined, those that met taken for one, the most probable refined again, and of these the most probable polished."""
     samples, few, apart = part_samples(part), thinned(part), _apart(search, part)
     first = refine(found.R, found.t, few, search.evidence, search.rough, search.weights, FIRST_STEPS)
-    order = np.argsort(-verify(first.R, first.t, few, search.evidence, search.limits).support, kind="stable")
+    verdict = verify(first.R, first.t, few, search.evidence, search.limits)
+    promise = promise_features(search, part, first.R, first.t, verdict)
+    if watch is not None:
+        watch("refined", first.R, first.t, promise)
+    order = np.argsort(-(promise @ FITTED.refined), kind="stable")
     kept = distinct(first.R, first.t, order, part, apart, MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE)
     last = refine(first.R[kept], first.t[kept], samples, search.evidence, search.limits, search.weights, LAST_STEPS)
-    rated = rate(search, part, last, verify(last.R, last.t, samples, search.evidence, search.limits), look_again=True)
+    rated = rate(search, part, last, verify(last.R, last.t, samples, search.evidence, search.limits))
     best = distinct(last.R, last.t, _order(search, part, rated), part, apart, len(kept))
     made = _candidates(search, part, last.rows(best), rated.rows(best), found.rows(kept[best]))
     worth_it = sum(candidate.score.probability > POLISHED_FROM for candidate in made[:MOST_POLISHED])
@@ -131,7 +143,7 @@ def _polished(search: Search, part: Part, refined: Refined, found: Assignments) 
     dense = part_samples(part, DENSER)
     last = refine(refined.R, refined.t, dense, search.evidence, search.limits, search.weights, LAST_STEPS)
     verdict = verify(last.R, last.t, part_samples(part), search.evidence, search.limits)
-    return _candidates(search, part, last, rate(search, part, last, verdict, look_again=True), found)
+    return _candidates(search, part, last, rate(search, part, last, verdict), found)
 
 
 def _order(search: Search, part: Part, rated: Rated) -> NDArray:
@@ -139,9 +151,9 @@ def _order(search: Search, part: Part, rated: Rated) -> NDArray:
     return np.argsort([-score.probability for score in scores(search, part, rated)], kind="stable")
 
 
-def rate(search: Search, part: Part, refined: Refined, verdict: Verdict, look_again: bool = False) -> Rated:
-    """How refined poses of a part rate, given their verdict; with a second look if `look_again`."""
-    tally = second_look(part, refined.R, refined.t, search.evidence, search.view.noise) if look_again else None
+def rate(search: Search, part: Part, refined: Refined, verdict: Verdict) -> Rated:
+    """How refined poses of a part rate, given their verdict, at a second look."""
+    tally = second_look(part, refined.R, refined.t, search.evidence, search.view.noise)
     sigma = _loosest(part, refined.R, refined.covariance)
     return Rated(verdict, refined.margin, refined.rms, sigma, footing(search, part, refined.R, refined.t), tally)
 

@@ -1,15 +1,16 @@
-"""Explain the view jointly: of the poses that could stand, those that can stand together and explain most.
+"""Explain the view jointly: how probable each pose is beside its rivals, and which can stand together and explain most.
 
-Two poses are rivals when they claim the same readings, pass through one another, or are one pose of one part. Choosing the
-greatest total worth among poses without rivals is a weighted independent set; its connected groups are small, and are
-solved exactly.
+Two poses are rivals when they claim the same readings, pass through one another, or are one pose of one part. Of those that claim
+the same readings at most one is right, perhaps none: their odds share the probability. Choosing the greatest total worth among poses
+without rivals is a weighted independent set; its connected groups are small, and are solved exactly.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from handey_studio.localization.candidates import Candidate
 from handey_studio.localization.distinct import displacement
@@ -21,6 +22,9 @@ from handey_studio.localization.search import Search
 MAX_CLAIMED = 0.3  # share of the readings that the smaller claim holds, which two poses may both claim
 SAME_SHARE = 0.1  # of a part's diameter: poses nearer than this are one
 MAX_EXACT = 24  # poses in one group of rivals; larger groups keep their best
+SAME_POSE = "the same as a better pose"
+SAME_READINGS = "its surface is explained by a better pose"
+WITHIN = "it would pass through a better pose"
 
 
 class Rivalry(NamedTuple):
@@ -32,49 +36,76 @@ class Rivalry(NamedTuple):
     unit: str
 
 
+Rivals = Mapping[tuple[int, int], Rivalry]  # by the numbers of two candidates, the smaller one first
+
+
 class Explanation(NamedTuple):
-    """`chosen` numbers of candidates that stand together, of most worth first; `fell` tells why each other one cannot stand beside them."""
+    """`chosen` numbers of candidates that stand together, of most worth first; `fell` tells beside which better one, and
+    why, each other one cannot stand."""
 
     chosen: list[int]
-    fell: dict[int, Rivalry]
+    fell: dict[int, tuple[int, Rivalry]]
 
 
-def explain_jointly(search: Search, candidates: list[Candidate], worth: Sequence[float]) -> Explanation:
-    """The candidates that can stand together and are of the greatest total worth."""
-    rivals = _rivals(search, candidates)
-    chosen: list[int] = []
-    for group in _groups(len(candidates), rivals):
-        chosen += _best_of(sorted(group, key=lambda n: -worth[n])[:MAX_EXACT], np.asarray(worth), rivals)
-    chosen.sort(key=lambda n: -worth[n])
-    fell = {}
-    for n in set(range(len(candidates))) - set(chosen):
-        against = [rivals[min(n, k), max(n, k)] for k in chosen if (min(n, k), max(n, k)) in rivals]
-        fell[n] = against[0] if against else Rivalry("better poses take its place", worth[n], worth[chosen[0]], "")
-    return Explanation(chosen, fell)
-
-
-def _rivals(search: Search, candidates: list[Candidate]) -> dict[tuple[int, int], Rivalry]:
-    claims = [_claim(search, candidate) for candidate in candidates]
-    found = {}
+def rivals_among(search: Search, candidates: Sequence[Candidate]) -> Rivals:
+    """Why two of the candidates cannot both stand, for each two that cannot."""
+    shares, found = claims_shared(search, candidates), {}
     for b in range(len(candidates)):
         for a in range(b):
-            rivalry = _rivalry(search, candidates[a], candidates[b], claims[a], claims[b])
+            rivalry = _rivalry(search, candidates[a], candidates[b], float(shares[a, b]))
             if rivalry is not None:
                 found[a, b] = rivalry
     return found
 
 
-def _rivalry(search: Search, a: Candidate, b: Candidate, claim_a: NDArray, claim_b: NDArray) -> Rivalry | None:
+def claims_shared(search: Search, candidates: Sequence[Candidate]) -> NDArray:
+    """(n, n) of the readings that lie on the one of two candidates that claims fewer, the share that lies on the other too."""
+    if not candidates:
+        return np.zeros((0, 0))
+    claims = [_claim(search, candidate) for candidate in candidates]
+    count, pixels = np.array([len(claim) for claim in claims], dtype=int), np.concatenate(claims)
+    first = np.concatenate([[0], np.cumsum(count)])
+    held = csr_array((np.ones(len(pixels), dtype=int), pixels, first), shape=(len(claims), search.evidence.depth.size))
+    return (held @ held.T).toarray() / np.maximum(np.minimum(count[:, None], count), 1)
+
+
+def probabilities(odds: NDArray, rivals: Rivals) -> NDArray:
+    """(n,) how probable each candidate is, given the logarithm (n,) of its odds against nothing that is known standing there: of those that
+    claim the same readings at most one is right."""
+    worth = np.exp(np.clip(odds, -40.0, 40.0))
+    total = 1.0 + worth
+    for (a, b), rivalry in rivals.items():
+        if rivalry.reason == SAME_READINGS:
+            total[a] += worth[b]
+            total[b] += worth[a]
+    return worth / total
+
+
+def explain_jointly(worth: Sequence[float], rivals: Rivals) -> Explanation:
+    """The candidates that can stand together and are of the greatest total worth."""
+    chosen: list[int] = []
+    for group in _groups(len(worth), rivals):
+        chosen += _best_of(sorted(group, key=lambda n: -worth[n])[:MAX_EXACT], np.asarray(worth), rivals)
+    chosen.sort(key=lambda n: -worth[n])
+    fell = {}
+    for n in set(range(len(worth))) - set(chosen):
+        beside = sorted((k for pair in rivals if n in pair for k in pair if k != n), key=lambda k: (k not in chosen, -worth[k]))
+        fell[n] = (beside[0], rivals[min(n, beside[0]), max(n, beside[0])])
+    return Explanation(chosen, fell)
+
+
+def _rivalry(search: Search, a: Candidate, b: Candidate, shared: float) -> Rivalry | None:
+    if not _near(a, b):
+        return None
     T_a, T_b = pose_matrix(a.R, a.t), pose_matrix(b.R, b.t)
     near = SAME_SHARE * a.part.solid.diameter
     if a.part.name == b.part.name and (moved := displacement(T_a, T_b, a.part)) < near:
-        return Rivalry("the same as a better pose", moved, near, "m")
-    shared = len(np.intersect1d(claim_a, claim_b, assume_unique=True)) / max(1, min(len(claim_a), len(claim_b)))
+        return Rivalry(SAME_POSE, moved, near, "m")
     if shared > MAX_CLAIMED:
-        return Rivalry("its surface is explained by a better pose", shared, MAX_CLAIMED, "")
+        return Rivalry(SAME_READINGS, shared, MAX_CLAIMED, "")
     tolerance = 6.0 * search.view.noise + search.view.outline_error
-    through = overlap_depth(a.part, T_a, b.part, T_b) if _near(a, b) else 0.0
-    return Rivalry("it would pass through a better pose", through, tolerance, "m") if through > tolerance else None
+    through = overlap_depth(a.part, T_a, b.part, T_b)
+    return Rivalry(WITHIN, through, tolerance, "m") if through > tolerance else None
 
 
 def _near(a: Candidate, b: Candidate) -> bool:
@@ -89,7 +120,7 @@ def _claim(search: Search, candidate: Candidate) -> NDArray:
     return claimed_pixels(solid.vertices @ candidate.R.T + candidate.t, solid.triangles, search.evidence, search.limits.agree)
 
 
-def _groups(n: int, rivals: dict[tuple[int, int], Rivalry]) -> list[list[int]]:
+def _groups(n: int, rivals: Rivals) -> list[list[int]]:
     """Candidates connected by rivalry."""
     group = list(range(n))
     for a, b in rivals:
@@ -98,7 +129,7 @@ def _groups(n: int, rivals: dict[tuple[int, int], Rivalry]) -> list[list[int]]:
     return [[k for k in range(n) if group[k] == number] for number in sorted(set(group))]
 
 
-def _best_of(group: list[int], worth: NDArray, rivals: dict[tuple[int, int], Rivalry]) -> list[int]:
+def _best_of(group: list[int], worth: NDArray, rivals: Rivals) -> list[int]:
     """The subset without rivals of the greatest total worth, by branch and bound over the group, best first."""
     best: tuple[float, list[int]] = (0.0, [])
 

@@ -22,6 +22,10 @@ def locate_report(result: LocateResult, T_world_sensor: NDArray, timing_s: dict[
                 "edges_found": pose.edges_found,
                 "visible_fraction": pose.visible_fraction,
                 "surface_rms_m": pose.surface_rms_m,
+                "rivals": [
+                    {"part": rival.part, "T_world_part": rival.T_world_part.tolist(), "probability": rival.probability}
+                    for rival in pose.rivals
+                ],
             }
             for pose in result.poses
         ],

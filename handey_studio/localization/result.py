@@ -22,8 +22,20 @@ class LocateOptions:
     min_edge_m: float | None = None
     max_data_edges: int = 600
     max_hypotheses: int = 40000
-    max_refined: int = 300
+    max_refined: int = 160
     table_z_m: float | None = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Rival(Value):
+    """What readings could be as well: a `part` at a pose (4, 4), with the `probability` that it is that."""
+
+    part: str
+    T_world_part: NDArray
+    probability: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_part", frozen_array(self.T_world_part))
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +44,7 @@ class LocatedPose(Value):
     (before coarse sensors a rule on agreement, see `score`);
     `visible_fraction` of the faces turned to the sensor is seen; `surface_rms_m` [m] how far
     readings lie off them; `margin_m` [m] what the sensor lost at silhouettes, `sigma_m` [m] the standard deviation of its
-    loosest point."""
+    loosest point; `rivals` what else its readings could be, the most probable first."""
 
     part: str
     T_world_part: NDArray
@@ -44,6 +56,7 @@ class LocatedPose(Value):
     surface_rms_m: float
     margin_m: float = 0.0
     sigma_m: float = 0.0
+    rivals: tuple[Rival, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_part", frozen_array(self.T_world_part))
@@ -54,7 +67,7 @@ class LocatedPose(Value):
 class Hypothesis(Value):
     """A pose that was weighed: from one or two data edges `data` assigned to model edges `model` (their numbers), its `score`, and what was
     found and what was missing [m of edge]; `reason` says why it fell, None if it was accepted, and the ledger's entry number `entry`
-    by how much (-1: none)."""
+    by how much (-1: none); of an accepted one `rivals` tell what else its readings could be."""
 
     part: str
     T_world_part: NDArray
@@ -65,6 +78,7 @@ class Hypothesis(Value):
     reason: str | None
     model: tuple[int, ...] = ()
     entry: int = -1
+    rivals: tuple[Rival, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_part", frozen_array(self.T_world_part))

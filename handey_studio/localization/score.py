@@ -1,20 +1,20 @@
 """The score: how probable it is that a pose is right, from what the view shows of it.
 
-A logistic regression over ratios that mean the same for every part. Its weights stand in `score.toml`; `handey fit score` fits them
-to the candidates, right and wrong, of simulated piles seen by a fine sensor (0.5 mm of noise), whose truth is known. Where a sensor's
-noise hides the small differences between look-alikes, and models are no truer than it (cartons before a Kinect), such weights ask for
-too much: there the score goes by how far edges and surfaces agree, as many cells hold few parts of one size. Between the two it changes
-over gradually.
+A conditional logit over numbers that mean the same for every part: of the poses that claim the same readings, the odds of each are the
+exponential of its weighed features, and those of "none of them" are 1 (see `joint.probabilities`). Its weights stand in `score.toml`;
+`handey fit score` fits them to the candidates, right and wrong, of simulated piles seen by a fine sensor (0.5 mm of noise), whose
+truth is known. Where a sensor's noise hides the small differences between look-alikes, and models are no truer than it (cartons before
+a Kinect), such weights ask for too much: there the score goes by how far edges and surfaces agree, as many cells hold few parts of one
+size. Between the two it changes over gradually.
 """
 
-import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from handey_studio.localization.fitted import TABLE
 from handey_studio.localization.search import Search
 from handey_studio.localization.second_look import Tally
 from handey_studio.localization.verify import Verdict
@@ -22,20 +22,24 @@ from handey_studio.world.part import Part
 
 FEATURES = (
     "outlines that should be seen are missing",  # metres of silhouette a metre of visible edge
-    "creases that should be seen are missing",  # metres a metre of visible edge
-    "too few of its edges are found",  # logarithm of their number
+    "too much of its outline is missing",  # diameters
+    "creases that should be seen are missing",  # diameters
+    "too few of its edges are found",  # their number
+    "too little of its edges is found",  # logarithm of diameters
     "its outline is larger than what is seen",  # margin, in spreads of what sensors lose at silhouettes
-    "one of its faces lies beside the readings",  # mean, in what noise and outlines leave uncertain
+    "its outline scatters",  # in what noise and outlines leave uncertain
+    "one of its faces lies beside the readings",  # mean, in what noise leaves uncertain
     "the sensor sees through it",  # logarithm of ten-thousandths of a square diameter
+    "the sensor sees through much of it",  # root of square diameters
     "readings lie before its faces",  # root of the share of the surface
     "too little of its surface is seen",  # logarithm of square diameters
-    "there are no readings where it should be",  # share of the surface
-    "it would stand below the table",  # what noise and looseness leave uncertain
+    "much of it is hidden",  # root of the share of the faces that look at the sensor
+    "it would stand below the table",  # what noise and outlines leave uncertain
     "it touches the table nowhere",  # 1 if a corner does, to within what noise and looseness leave uncertain
-    "no two corners touch the table",
     "no three corners touch the table",
     "it does not rest on the table",  # 1 if three corners do, to within noise
 )
+LEAST_EDGE_M = 0.001  # a logarithm is taken of no less
 FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and from which agreement decides
 AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.873  # edges times surfaces that agree: how fast odds grow, and where they are even
 EDGES_WORTH, EVEN_EDGES = 4.0, 6.0  # more edges that are found say more
@@ -58,25 +62,24 @@ def weights_from(table: Mapping[str, Any]) -> ScoreWeights:
     return ScoreWeights(float(table["intercept"]), worth, typical)
 
 
-FITTED = weights_from(tomllib.loads(Path(__file__).with_name("score.toml").read_text()))
+FITTED = weights_from(TABLE)
 
 
 class Rated(NamedTuple):
     """Poses (n,) of one part as the score looks at them: their `verdict`, the `margin` [m] and `rms` [m] of their refinement, how far
-    [m] their loosest point could be off, `sigma`, their `footing` (n, 3) [m], and the `tally` of the second look if they had one."""
+    [m] their loosest point could be off, `sigma`, their `footing` (n, 3) [m], and the `tally` of the second look."""
 
     verdict: Verdict
     margin: NDArray
     rms: NDArray
     sigma: NDArray
     footing: NDArray
-    tally: Tally | None
+    tally: Tally
 
     def rows(self, chosen: NDArray) -> "Rated":
         """Some of the poses, by their numbers."""
-        tally = None if self.tally is None else self.tally.rows(chosen)
-        verdict, margin, rms, sigma, footing, _ = self
-        return Rated(verdict.rows(chosen), margin[chosen], rms[chosen], sigma[chosen], footing[chosen], tally)
+        verdict, margin, rms, sigma, footing, tally = self
+        return Rated(verdict.rows(chosen), margin[chosen], rms[chosen], sigma[chosen], footing[chosen], tally.rows(chosen))
 
     @property
     def below(self) -> NDArray:
@@ -86,64 +89,73 @@ class Rated(NamedTuple):
 
 def features(search: Search, part: Part, rated: Rated) -> NDArray:
     """(n, k) the numbers that the score weighs, in the order of `FEATURES`: what is not known is what is typical of right poses."""
-    found = np.concatenate([_of_edges(search, rated), _of_readings(search, part, rated), _of_footing(search, rated)], axis=1)
+    found = np.concatenate([_of_edges(search, part, rated), _of_readings(part, rated), _of_footing(search, rated)], axis=1)
     return np.where(np.isnan(found), FITTED.typical, found)
 
 
-def _of_edges(search: Search, rated: Rated) -> NDArray:
-    v, view = rated.verdict, search.view
-    visible = np.maximum(v.found + v.missing, 1e-9)
+def _of_edges(search: Search, part: Part, rated: Rated) -> NDArray:
+    v, view, diameter = rated.verdict, search.view, part.solid.diameter
+    missing = v.missing - v.unbent
     return np.stack(
         [
-            (v.missing - v.unbent) / visible,
-            v.unbent / visible,
-            np.log(np.maximum(v.edges, 0.5)),
+            missing / np.maximum(v.found + v.missing, 1e-9),
+            missing / diameter,
+            v.unbent / diameter,
+            v.edges,
+            np.log(np.maximum(v.found, LEAST_EDGE_M) / diameter),
             np.minimum(np.abs(rated.margin - search.weights.margin) / search.weights.margin_spread, 6.0),
+            np.minimum(v.scatter / search.slack, 5.0),
             np.minimum(v.lifted / (view.noise + 0.1 * view.outline_error), 5.0),
         ],
         axis=1,
     )
 
 
-def _of_readings(search: Search, part: Part, rated: Rated) -> NDArray:
-    if rated.tally is None:
-        return np.full((len(rated.rms), 4), np.nan)
-    tally, diameter = rated.tally, part.solid.diameter
+def _of_readings(part: Part, rated: Rated) -> NDArray:
+    tally, square = rated.tally, part.solid.diameter**2
+    every = np.maximum(sum(tally), 1e-12)
     return np.stack(
         [
-            np.log1p(1e4 * tally.through / diameter**2),
+            np.log1p(1e4 * tally.through / square),
+            np.sqrt(tally.through / square),
             np.sqrt(np.minimum(tally.before / np.maximum(tally.on + tally.before, 1e-12), 0.25)),
-            np.log(np.maximum(tally.on, 1e-6 * diameter**2) / diameter**2),
-            tally.unread / np.maximum(tally.on + tally.through + tally.unread, 1e-12),
+            np.log(np.maximum(tally.on / square, 1e-6)),
+            np.sqrt(tally.hidden / every),
         ],
         axis=1,
     )
 
 
 def _of_footing(search: Search, rated: Rated) -> NDArray:
-    height, view = rated.footing, search.view
+    height, view = rated.footing[:, [0, 2]], search.view
     uncertain = TOUCHES * (view.noise + np.minimum(rated.sigma, search.slack))[:, None]
+    below = np.clip(-height[:, :1] / search.slack, 0.0, 4.0)
     touches = np.where(np.isnan(height), np.nan, height < uncertain)
-    rests = np.where(np.isnan(height[:, 2:]), np.nan, np.abs(height[:, 2:]) < TOUCHES * view.noise + 0.25 * view.outline_error)
-    return np.concatenate([np.clip(-height[:, :1] / uncertain - 1.0, 0.0, 4.0), touches, rests], axis=1)
+    rests = np.where(np.isnan(height[:, 1:]), np.nan, np.abs(height[:, 1:]) < TOUCHES * view.noise + 0.25 * view.outline_error)
+    return np.concatenate([below, touches, rests], axis=1)
 
 
 class Score(NamedTuple):
-    """`probability` in [0, 1] that a pose is right, the `doubt`: what speaks most against it, and the `features` (k,) that tell so."""
+    """The logarithm of the `odds` that a pose is right, against nothing known standing there; the `doubt`: what speaks most against it, and
+    the `features` (k,) that tell so."""
 
-    probability: float
+    odds: float
     doubt: str
     features: NDArray
 
+    @property
+    def probability(self) -> float:
+        """In [0, 1], as if the pose had no rivals."""
+        return float(1.0 / (1.0 + np.exp(-np.clip(self.odds, -40.0, 40.0))))
+
 
 def scores(search: Search, part: Part, rated: Rated) -> list[Score]:
-    """How probable each pose is."""
+    """How probable each pose is by itself."""
     found = features(search, part, rated)
     doubts = np.argmin(FITTED.worth * (found - FITTED.typical), axis=1)
     coarse = np.clip((search.view.noise - FINE_M) / (COARSE_M - FINE_M), 0.0, 1.0)
     odds = (1.0 - coarse) * (FITTED.intercept + found @ FITTED.worth) + coarse * _coarse_odds(search, rated)
-    probability = 1.0 / (1.0 + np.exp(-odds))
-    return [Score(float(p), FEATURES[doubt], row) for p, doubt, row in zip(probability, doubts, found, strict=True)]
+    return [Score(float(x), FEATURES[doubt], row) for x, doubt, row in zip(odds, doubts, found, strict=True)]
 
 
 def _coarse_odds(search: Search, rated: Rated) -> NDArray:

@@ -21,8 +21,7 @@ MIN_OF_ONE = 4  # samples of a face before their mean counts
 STEEP = 0.4  # cosine; a face seen more squarely than this should give readings
 UNREAD_COST = 0.3  # of a reading that sees through: no reading where there should be one
 ENDS_WORTH = 0.5  # of a found edge: the surface ends within the tolerance, but raggedly
-CREASE_DISCOUNT = 0.5  # of a missing edge, if it is a crease
-GLANCE = 50  # points of all faces that the first look takes
+GLANCE, MOST_GLANCES = 12, 200  # points of faces in sight that the first look asks for, and how many points it tries to get them
 MAX_THROUGH = 0.3
 LEAST_POSES = 5  # that are worth a share
 MIN_VISIBLE_SHARE = 0.2  # of an edge's samples that must be visible for the edge to be predicted
@@ -69,12 +68,6 @@ class Verdict(NamedTuple):
     def visible_fraction(self) -> NDArray:
         """Share of the faces looking at the sensor that is seen."""
         return self.on / np.maximum(self.on + self.through + self.hidden + self.unknown, 1e-12)
-
-    @property
-    def support(self) -> NDArray:
-        """Rank [m]: found less missing edge, less what is seen through, as a length, times the shares that are right."""
-        balance = self.found - self.missing + CREASE_DISCOUNT * self.unbent - 2.0 * np.sqrt(self.through)
-        return balance * np.where(balance > 0, self.edge_share * self.surface_share**2, 1.0)
 
 
 def verify(R: NDArray, t: NDArray, samples: PartSamples, evidence: Evidence, limits: Limits, every: int = 1) -> Verdict:
@@ -263,11 +256,13 @@ def _surfaces(R, t, samples, evidence, limits, offset, every, out):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _unopposed(R, t, samples, evidence, limits, poses, good):
     points, faces, rims, depth, camera = samples.face_point, samples.face, samples.face_rim, evidence.depth, evidence.camera
-    step = max(1, len(faces) // GLANCE)
+    stride = _spreading(len(faces))
     for n in range(poses[0], poses[1]):
         normals = turned(R[n], samples.normal)
         on = through = 0
-        for k in range(n % step, len(faces), step):
+        k = n % len(faces)
+        for _ in range(min(len(faces), MOST_GLANCES)):
+            k = (k + stride) % len(faces)
             face = faces[k]
             x, y, z = placed(R[n], t[n], points, k)
             cosine = facing(normals[face, 0], normals[face, 1], normals[face, 2], x, y, z, camera)
@@ -275,7 +270,18 @@ def _unopposed(R, t, samples, evidence, limits, poses, good):
                 continue
             seen, _ = reading_at(x, y, z, depth, camera, limits)
             on, through = on + (seen == ON), through + (seen == THROUGH)
+            if on + through == GLANCE or through > MAX_THROUGH * GLANCE:
+                break
         good[n] = on > 0 and through <= MAX_THROUGH * (on + through)
+
+
+@njit(cache=True)
+def _spreading(count):
+    """A step by which one comes to every one of `count` numbers, and to far ones first."""
+    step = max(1, int(0.618 * count))
+    while np.gcd(step, count) > 1:
+        step += 1
+    return step
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

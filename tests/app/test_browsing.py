@@ -26,11 +26,12 @@ from handey_studio.app.palette import residual_colours
 from handey_studio.app.panels.edges import about_edge, edge_labels, edges_legend, number_of
 from handey_studio.app.panels.explained import explained_html
 from handey_studio.app.panels.rows import hypothesis_rows, percent
+from handey_studio.app.panels.sensing import found_html
 from handey_studio.app.scene.pair import parameter_texts, parameters
 from handey_studio.app.state import Explained, opened, with_view
 from handey_studio.base import Entry
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
-from handey_studio.localization import Hypothesis
+from handey_studio.localization import Hypothesis, LocatedPose, Rival
 from handey_studio.session import session_from_bytes, session_to_bytes
 from handey_studio.session.looking import cells_of, explained, wires_of
 from tests.session.samples import full_session, library
@@ -262,3 +263,18 @@ def test_looking_at_the_configuration_space_shows_it(browsing):
     bench = Eye(browsing)
     assert "configuration space" in browsing.session.view.hidden_layers
     assert "configuration space" not in LookFrom("C-space", None).run(bench).session.view.hidden_layers
+
+
+def test_what_a_located_part_could_also_be_is_told_and_kept(full):
+    """In the row of the part and in that of its hypothesis; a saved session says the same."""
+    located, T = full.session.scene.located, from_xyz_rpy((0.3, 0.1, 0.0))
+    rivals = (Rival("brick", T, 0.31), Rival("l_block", T, 0.124))
+    poses = (LocatedPose("l_block", T, T, 0.6, 9, 9, 0.8, 0.0004, rivals=rivals),)
+    hypotheses = (replace(located.hypotheses[0], rivals=rivals),)
+    scene = replace(full.session.scene, located=replace(located, poses=poses, hypotheses=hypotheses))
+    session = replace(full.session, scene=scene)
+    words = "could also be brick (31 %), the same, placed otherwise (12 %)"
+    assert words in found_html(session) and f"accepted, {words}" in hypothesis_rows(scene, (0,), (0,), 0, ())
+    assert "could also be" not in found_html(full.session)
+    kept = session_from_bytes(session_to_bytes(session), "kept")
+    assert kept.scene is not None and kept.scene.located.poses == poses and kept.scene.located.hypotheses == hypotheses

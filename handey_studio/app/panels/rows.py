@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from handey_studio.app import html, palette
 from handey_studio.app.palette import css
 from handey_studio.base import describe
-from handey_studio.localization import Hypothesis
+from handey_studio.localization import Hypothesis, Rival
 from handey_studio.session.looking import ACCEPTED, entry_of
 from handey_studio.task.sense import Scene
 
@@ -60,9 +60,15 @@ def percent(share: float) -> str:
     return "< 1 %" if share < 0.01 else "> 99 %" if share > 0.99 else f"{100 * share:.0f} %"
 
 
+def could_also_be(part: str, rivals: Sequence[Rival]) -> str:
+    """What else the readings of an accepted part could be, with the probabilities; empty if nothing."""
+    words = [f"{'the same, placed otherwise' if rival.part == part else rival.part} ({percent(rival.probability)})" for rival in rivals]
+    return f"could also be {', '.join(words)}" if words else ""
+
+
 def reason_of(scene: Scene, hypothesis: Hypothesis) -> str:
-    """Accepted, or the reason with the number and the limit from the ledger."""
+    """Accepted, with what else it could be, or the reason with the number and the limit from the ledger."""
     if hypothesis.reason is None:
-        return ACCEPTED
+        return ", ".join(filter(None, (ACCEPTED, could_also_be(hypothesis.part, hypothesis.rivals))))
     entry = entry_of(scene, hypothesis)
     return describe(entry) if entry is not None and entry.reason == hypothesis.reason else hypothesis.reason

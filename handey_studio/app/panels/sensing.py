@@ -12,7 +12,7 @@ from handey_studio.app.browsing import ROWS, browsed_hypotheses, page_of
 from handey_studio.app.commands import Browse, BrowseRow, FilterHypotheses, LookAt
 from handey_studio.app.panels.explained import explained_html
 from handey_studio.app.panels.move import choose
-from handey_studio.app.panels.rows import hypothesis_rows
+from handey_studio.app.panels.rows import could_also_be, hypothesis_rows
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.geometry.transforms import to_xyz_rpy
@@ -93,6 +93,7 @@ def found_html(session: Session) -> str:
     places = {placed.name: _where(placed.T_world_part) for placed in session.scene.instances}
     for placed, pose in zip(session.scene.instances, session.scene.located.poses, strict=False):
         places[placed.name] += f"; {100 * pose.visible_fraction:.0f} % seen, {1e3 * pose.surface_rms_m:.2f} mm rms"
+        places[placed.name] += f"; {words}" if (words := could_also_be(pose.part, pose.rivals)) else ""
     return html.facts(places.items(), "located")
 
 
