@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Posture, Progress, Value, frozen_array
+from handey_studio.geometry.transforms import inverse
+from handey_studio.grasping import gravity_in_hand
 from handey_studio.motion import Certificate, PathOptions, PathResult, Trajectory, certify, plan_path, time_path
 from handey_studio.task.ends import End, held_part
-from handey_studio.task.grasps import CLOSED_MARGIN_M, Grasp, finger_pairs
+from handey_studio.task.grasps import CLOSED_MARGIN_M, Grasp, finger_pairs, grip_of, plain, slipping
 from handey_studio.task.options import Pairs
 from handey_studio.task.plan import Carry, Step, StepKind
-from handey_studio.world import Held, World
+from handey_studio.world import Held, World, arm_of
 from handey_studio.world.collision import collision_model
 
 TOLD_M = 0.05  # farther apart than this nobody needs to know how far
@@ -66,22 +68,15 @@ def join(
 
     Three free motions, the hardest first: the transfer, to the pickup, and, after the last carry, home.
     """
-    goal, choice = grasp.option.goal, grasp.choice
-    held = held_part(grasp)
+    goal, choice, held = grasp.option.goal, grasp.choice, held_part(grasp)
 
     def free(world: World, a: NDArray, b: NDArray, opening: float, carried: Held | None, what: str) -> PathResult | None:
         key = (world, a.tobytes(), b.tobytes(), opening, grasp if carried else None)
         if key not in kept:
             progress.report(0.5, f"planning the arm's motion {what}")
-            options = PathOptions(straight=carried is None)
-            kept[key] = plan_path(world, a, b, opening, carried, options=options, rng=rng, progress=progress)
-        found = kept[key]
-        holding = world.robot.holding(np.array([a, b]))
-        words = f"{what}, {holding}" if holding else what
-        below = ledger.add("arm motion", words, None if found.found else found.reason, parent=entry,
-                           posture=None if found.found else Posture(tuple(b.tolist()), (), opening, goal.instance.name))  # fmt: skip
-        ledger.adopt(found.entries, parent=below)
-        return found if found.found else None
+            kept[key] = plan_path(world, a, b, opening, carried, options=PathOptions(straight=carried is None), rng=rng, progress=progress)
+        _note(kept[key], what, world.robot.holding(np.array([a, b])), Posture(plain(b), (), opening, goal.instance.name), entry, ledger)
+        return kept[key] if kept[key].found else None
 
     lifted, raised = pickup.away.q_rad[-1], putdown.towards.q_rad[0]
     transfer = free(goal.carried, lifted, raised, choice.width, held, "of the transfer")
@@ -95,9 +90,23 @@ def join(
         ledger.fall(entry, certificate.reason or "not proved", unit="m", value=certificate.least_clearance,
                     limit=certificate.margin, bodies=certificate.bodies)  # fmt: skip
         return None
+    q_held = np.concatenate([step.q_rad for step in steps if step.held])
+    grip = grip_of(grasp.option, inverse(choice.T_hand_part), gravity_in_hand(arm_of(goal.carried.robot).hand_pose(q_held)))
+    fell = slipping(grip, Posture(plain(raised), (), choice.width, held.name))
+    if fell is not None:
+        ledger.fall(entry, f"{fell.reason} on the way", value=fell.value, limit=fell.limit, unit=fell.unit, posture=fell.posture)
+        return None
     margin = min(float(goal.at_start.robot.limit_margin(step.q_rad).min()) for step in steps)
-    carry = Carry(grasp.option.T_world_start, goal.T_world_goal, replace(choice, joint_margin=margin), grasp.approach, transfer.space)
+    choice = replace(choice, joint_margin=margin, grip=grip)
+    carry = Carry(grasp.option.T_world_start, goal.T_world_goal, choice, grasp.approach, transfer.space)
     return Carried(carry, steps, certificate, steps[-1].q_rad[-1], choice.opening)
+
+
+def _note(found: PathResult, what: str, holding: str, posture: Posture, entry: int, ledger: Ledger) -> None:
+    """A free motion in the ledger, with what planning it tried."""
+    fell = None if found.found else found.reason
+    below = ledger.add("arm motion", f"{what}, {holding}" if holding else what, fell, parent=entry, posture=posture if fell else None)
+    ledger.adopt(found.entries, parent=below)
 
 
 def _steps(

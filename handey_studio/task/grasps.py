@@ -10,22 +10,24 @@ from handey_studio.geometry.transforms import inverse
 from handey_studio.grasping import (
     HAND_MARGIN_M,
     BumpRun,
-    GraspGroup,
     GraspPlane,
+    Grip,
     LegalRotations,
     contact_area,
     fill_grasp_plane,
+    gravity_in_hand,
+    grip_margin,
     hand_in_plane,
-    opening_around,
-    plan_approach,
+    pad_wrenches,
+    plan_grasp_motion,
+    plan_retreat,
     tilt,
 )
 from handey_studio.task.options import Option
 from handey_studio.task.plan import GraspChoice
-from handey_studio.world import FINGERS, Hand
+from handey_studio.world import FINGERS
 from handey_studio.world.collision import collision_model
 
-STANDOFFS_M = (0.08, 0.05)  # the approach starts with the fingertips this far in front of the grasp point
 CLOSED_MARGIN_M = 1e-4  # fingers that close on a part keep this from all else; what stands beside the part is that near
 
 
@@ -86,11 +88,11 @@ def fall_illegal(option: Option, rotations: LegalRotations, entry: int, ledger: 
     ledger.fall(entry, fault.reason, value=fault.value, limit=fault.limit, unit="rad", bodies=fault.bodies, posture=posture)
 
 
-def grasp_plane_of(option: Option) -> GraspPlane:
-    """The grasp plane at the pickup, filled with everything that the world believes."""
-    group, hand = option.group, option.goal.at_start.robot.hand
-    T_world_plane = option.T_world_start @ group.grasp_class.T_part_plane
-    return fill_grasp_plane(option.goal.at_start, T_world_plane, group.point, hand, option.opening)
+def grasp_plane_at(option: Option, end: int) -> GraspPlane:
+    """The grasp plane at one end (0 pickup, 1 putdown), filled with everything that the world believes."""
+    group, goal = option.group, option.goal
+    world, T_world_part = ((goal.at_start, option.T_world_start), (goal.at_goal, goal.T_world_goal))[end]
+    return fill_grasp_plane(world, T_world_part @ group.grasp_class.T_part_plane, group.point, world.robot.hand, option.opening)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,52 +110,79 @@ class Approach(Value):
         return self.run.path[-1]
 
 
-def approach_at(option: Option, plane: GraspPlane, angle: float) -> Approach:
-    """The approach of an option from one hand angle."""
+NO_WAY_IN = {
+    "stuck": "the approach got stuck",
+    "iterations": "the approach ran out of steps",
+    "blocked start": "the way in starts blocked",
+    "short contact": "the fingers overlap the face too little after the approach",
+    "no way": "there is no way in, by search of all motions in the grasp plane",
+}
+
+
+def approach_at(option: Option, plane: GraspPlane, angle: float, ranges: NDArray) -> Approach:
+    """The approach of an option from one hand angle; `ranges` (m, 2) [rad] are the angles that are legal at the pickup."""
     hand, group = option.goal.at_start.robot.hand, option.group
-    run = approach_run(plane, group, hand, angle)
+    run = plan_grasp_motion(plane, hand, group, angle, ranges)
     final = run.path[-1]
     T_world_hand = option.T_world_start @ group.grasp_class.T_part_plane @ hand_in_plane(final[:2], final[2], 1)
     posture = hand_posture(option, T_world_hand, option.opening, 0)
     area = contact_area(group.grasp_class, hand, final[:2], final[2])
-    if run.status != "reached":
-        reason = {"stuck": "the approach got stuck", "iterations": "the approach ran out of steps"}
-        words = reason.get(run.status, "the way in starts blocked")
-        return Approach(run, area, Fall(words, run.distance, run.threshold, "m", posture=posture))
-    if area < hand.min_contact_area:
-        words = "the fingers overlap the face too little after the approach"
-        return Approach(run, area, Fall(words, area, hand.min_contact_area, "m²", posture=posture))
-    return Approach(run, area, _blocked(option, T_world_hand, 0))
+    if run.status == "reached":
+        return Approach(run, area, _blocked(option, T_world_hand, 0))
+    if run.status == "short contact":
+        return Approach(run, area, Fall(NO_WAY_IN[run.status], area, hand.min_contact_area, "m²", posture=posture))
+    return Approach(run, area, Fall(NO_WAY_IN[run.status], run.distance, run.threshold, "m", posture=posture))
 
 
-def grasps_at(option: Option, rotations: LegalRotations, approach: Approach, entry: int, ledger: Ledger) -> list[Grasp]:
-    """The grasps at the end of an approach, one for each way round of the hand; none if it falls."""
-    final, T_part_plane = approach.final, option.group.grasp_class.T_part_plane
-    fell = approach.fell or _blocked(option, option.goal.T_world_goal @ T_part_plane @ _straight_back(final, 1)[0], 1)
-    if fell is not None:
-        ledger.fall(entry, fell.reason, value=fell.value, limit=fell.limit, unit=fell.unit, bodies=fell.bodies, posture=fell.posture)
+def grasps_at(
+    option: Option, rotations: LegalRotations, approach: Approach, putdown: GraspPlane, entry: int, ledger: Ledger
+) -> list[Grasp]:
+    """The grasps at the end of an approach, one for each way round of the hand; none if it falls. `putdown` is the grasp plane there."""
+    T_part_plane, hand = option.group.grasp_class.T_part_plane, option.goal.at_start.robot.hand
+    final = approach.final
+    T_part_hand = T_part_plane @ hand_in_plane(final[:2], final[2], 1)
+    ends = option.T_world_start @ T_part_hand, option.goal.T_world_goal @ T_part_hand
+    fell = approach.fell or _blocked(option, ends[1], 1)
+    grip = grip_of(option, T_part_hand, gravity_in_hand(np.array(ends)))
+    fell = fell or slipping(grip, hand_posture(option, ends[0], option.opening, 0))
+    out = plan_retreat(putdown, hand, final) if fell is None else None
+    if out is not None and out.status != "reached":
+        fell = Fall("the hand finds no way out at the putdown", out.distance, out.threshold, "m",
+                    posture=hand_posture(option, ends[1], option.opening, 1))  # fmt: skip
+    if fell is not None or out is None:
+        _tell(fell, entry, ledger)
         return []
     found = []
     for side in (1, -1):
-        in_plane = np.array([hand_in_plane(pose[:2], pose[2], side) for pose in approach.run.path])
-        hands = option.T_world_start @ T_part_plane @ in_plane
-        retreat = option.goal.T_world_goal @ T_part_plane @ _straight_back(final, side)
-        choice = _choice(option, rotations, final, T_part_plane @ in_plane[-1], (tilt(hands[-1]), tilt(retreat[0])), approach.area)
+        hands, back = (
+            T @ T_part_plane @ np.array([hand_in_plane(pose[:2], pose[2], side) for pose in path])
+            for T, path in ((option.T_world_start, approach.run.path), (option.goal.T_world_goal, out.path))
+        )
+        choice = _choice(option, rotations, approach, inverse(option.T_world_start) @ hands[-1], (tilt(hands[-1]), tilt(back[0])), grip)
         turned = ledger.add("hand", "one way round" if side > 0 else "the other way round", parent=entry)
-        found.append(Grasp(option, choice, approach.run, hands, retreat, turned))
+        found.append(Grasp(option, choice, approach.run, hands, back, turned))
     return found
 
 
-def approach_run(plane: GraspPlane, group: GraspGroup, hand: Hand, angle: float) -> BumpRun:
-    """The bump-line planner's run with the hand at first at an angle, from as far out as the way in is free."""
-    along = np.array([np.cos(angle), np.sin(angle)])
-    runs = []
-    for standoff in STANDOFFS_M:
-        start = np.append(group.point - (standoff + group.depth) * along, angle)
-        runs.append(plan_approach(plane, hand, start, group.point))
-        if runs[-1].status == "reached":
-            return runs[-1]
-    return min(runs, key=lambda run: run.distance)
+def grip_of(option: Option, T_part_hand: NDArray, down_hand: NDArray) -> Grip:
+    """How well the fingers hold the part at the worst of directions of gravity (n, 3) in the hand's frame."""
+    group, goal = option.group, option.goal
+    pads = pad_wrenches(group.grasp_class, goal.instance.part, goal.at_start.robot.hand, plain(inverse(T_part_hand)))
+    return grip_margin(pads, down_hand)
+
+
+def slipping(grip: Grip, posture: Posture) -> Fall | None:
+    """Why a grip does not hold the part's weight, None if it does."""
+    if grip.holds:
+        return None
+    if grip.force_margin < 0:
+        return Fall(f"the part {grip.limit} in the fingers", grip.force_margin, 0.0, "N", posture=posture)
+    return Fall(f"the part {grip.limit} in the fingers", grip.torque_margin, 0.0, "N m", posture=posture)
+
+
+def _tell(fell: Fall | None, entry: int, ledger: Ledger) -> None:
+    if fell is not None:
+        ledger.fall(entry, fell.reason, value=fell.value, limit=fell.limit, unit=fell.unit, bodies=fell.bodies, posture=fell.posture)
 
 
 def finger_pairs(name: str) -> tuple[tuple[str, str], ...]:
@@ -174,16 +203,10 @@ def _blocked(option: Option, T_world_hand: NDArray, end: int) -> Fall | None:
     return None
 
 
-def _straight_back(final: NDArray, side: int) -> NDArray:
-    """T_plane_hand (k, 4, 4) of the retreat: straight back along the fingers."""
-    along = np.array([np.cos(final[2]), np.sin(final[2])])
-    return np.array([hand_in_plane(final[:2] - back * along, final[2], side) for back in np.linspace(0.0, STANDOFFS_M[0], 17)])
-
-
 def _choice(
-    option: Option, rotations: LegalRotations, final: NDArray, T_part_hand: NDArray, tilts: tuple[float, float], area: float
+    option: Option, rotations: LegalRotations, approach: Approach, T_part_hand: NDArray, tilts: tuple[float, float], grip: Grip
 ) -> GraspChoice:
-    group, hand = option.group, option.goal.at_start.robot.hand
+    group = option.group
     T_part_plane = group.grasp_class.T_part_plane
     return GraspChoice(
         name=group.grasp_class.name,
@@ -193,13 +216,14 @@ def _choice(
         T_part_plane=T_part_plane,
         edge_part=_in_part(T_part_plane, group.edge),
         contact_part=_in_part(T_part_plane, group.grasp_class.outline),
-        angle=float(final[2]),
+        angle=float(approach.final[2]),
         ranges=np.array(rotations.ranges()).reshape(-1, 2),
         tilts=tilts,
         width=group.grasp_class.width,
-        opening=opening_around(hand, group.grasp_class.width),
-        contact_area=area,
+        opening=option.opening,
+        contact_area=approach.area,
         joint_margin=0.0,
+        grip=grip,
     )
 
 

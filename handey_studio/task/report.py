@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from handey_studio.base import entry_report, rejected_counts
+from handey_studio.base import entry_report, finite, rejected_counts
+from handey_studio.grasping import Grip
 from handey_studio.motion.answer import certificate_report
 from handey_studio.task.plan import Carry, GraspChoice, MoveResult, Step
 from handey_studio.world import Robot
@@ -61,6 +62,18 @@ def _grasp(grasp: GraspChoice) -> dict[str, Any]:
         "opening_m": grasp.opening,
         "contact_area_m2": grasp.contact_area,
         "joint_margin_rad": grasp.joint_margin,
+        "grip": _grip(grasp.grip) if grasp.grip else None,
+    }
+
+
+def _grip(grip: Grip) -> dict[str, Any]:
+    """How much more than the part's weight the fingers would hold, at the worst turn of the carry, and what would happen first."""
+    return {
+        "force_margin_N": grip.force_margin,
+        "torque_margin_Nm": grip.torque_margin,
+        "needed_force_N": finite(grip.needed_force),
+        "worst_down_hand": list(grip.worst),
+        "limit": grip.limit,
     }
 
 

@@ -19,7 +19,7 @@ from handey_studio.grasping import GraspPlane, LegalRotations, legal_rotations
 from handey_studio.task.carrying import Carried, Kept, Start, join, worst
 from handey_studio.task.detours import detours
 from handey_studio.task.ends import PICKUP, PUTDOWN, End, pickup_end, putdown_end, reachable
-from handey_studio.task.grasps import Approach, Grasp, approach_at, fall_illegal, grasp_plane_of, grasps_at
+from handey_studio.task.grasps import Approach, Grasp, approach_at, fall_illegal, grasp_plane_at, grasps_at
 from handey_studio.task.options import Goal, Option, options_of
 from handey_studio.task.plan import Carry, MovePlan, Step
 from handey_studio.task.stages import APPROACH, DETOUR, PATHS, REACH, ROTATIONS, STAGES, STRAIGHT, left
@@ -164,17 +164,23 @@ class OptionSearch:
     def _approach(self, node: Node) -> None:
         option, rotations, angle = node.what
         entry = self.ledger.add("approach", f"hand at {np.rad2deg(angle - option.group.angle):+.0f}°", parent=node.entry)
-        for grasp in grasps_at(option, rotations, self._way_in(option, angle), entry, self.ledger):
+        for grasp in grasps_at(option, rotations, self._way_in(option, rotations, angle), self._plane(option, 1), entry, self.ledger):
             self._push(Node(REACH, node.route, grasp, node.cost, grasp.entry))
 
-    def _way_in(self, option: Option, angle: float) -> Approach:
+    def _way_in(self, option: Option, rotations: LegalRotations, angle: float) -> Approach:
         """The approach at the pickup, which is the same wherever the part goes."""
-        here = _pickup_of(option)
-        if (*here, angle) not in self._approaches:
-            if here not in self._planes:
-                self._planes[here] = grasp_plane_of(option)
-            self._approaches[*here, angle] = approach_at(option, self._planes[here], angle)
-        return self._approaches[*here, angle]
+        key = (*_pickup_of(option), angle)
+        if key not in self._approaches:
+            legal = np.array(rotations.ranges("pickup")).reshape(-1, 2)
+            self._approaches[key] = approach_at(option, self._plane(option, 0), angle, legal)
+        return self._approaches[key]
+
+    def _plane(self, option: Option, end: int) -> GraspPlane:
+        """The grasp plane at one end (0 pickup, 1 putdown), filled once."""
+        key = _pickup_of(option) if end == 0 else (option.goal.at_goal, option.goal.T_world_goal.tobytes(), option.group)
+        if key not in self._planes:
+            self._planes[key] = grasp_plane_at(option, end)
+        return self._planes[key]
 
     def _reach(self, node: Node) -> None:
         grasp: Grasp = node.what

@@ -9,6 +9,7 @@ from handey_studio.app.state import State
 from handey_studio.app.svg import grasp_plane_html
 from handey_studio.app.wire import set_to
 from handey_studio.geometry.transforms import pose_difference
+from handey_studio.grasping import Grip
 from handey_studio.task.carrying import TOLD_M
 from handey_studio.task.plan import GraspChoice, MovePlan, MoveResult
 
@@ -135,8 +136,17 @@ def grasp_facts(grasp: GraspChoice) -> list[tuple[str, str]]:
         ("Tilt", f"{np.rad2deg(grasp.tilts[0]):.0f}° at pickup, {np.rad2deg(grasp.tilts[1]):.0f}° at putdown"),
         ("Fingers", f"{html.millimetres(grasp.width, 1)} held, {html.millimetres(grasp.opening)} open"),
         ("Contact", f"{1e6 * grasp.contact_area:.0f} mm² each"),
+        *([("Grip", grip_words(grasp.grip))] if grasp.grip else []),
         ("Joint limits", f"{np.rad2deg(grasp.joint_margin):.0f}° away"),
     ]
+
+
+def grip_words(grip: Grip) -> str:
+    """How much more than its weight the fingers would hold of the part."""
+    return (
+        f"{grip.force_margin:.1f} N and {grip.torque_margin:.2f} N m to spare at the worst turn, where it {grip.limit} first; "
+        f"{grip.needed_force:.1f} N would just hold"
+    )
 
 
 def _head(text: str) -> str:
