@@ -200,7 +200,7 @@ def test_the_whole_move_from_the_shell(tmp_path):
         (("studio", "--port", "99999"), "not a port"),
         (("move", "figure1", "--json", "no/folder/out.json"), 'the folder "no/folder" does not exist'),
         (("fly",), "invalid choice"),
-        (("bench", "piles", "--seeds", "a:b"), "FIRST:END"),
+        (("bench", "moves", "--seeds", "a:b"), "FIRST:END"),
     ],
 )
 def test_bad_input_is_one_sentence_and_status_2(tmp_path, arguments, says):
