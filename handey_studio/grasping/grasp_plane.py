@@ -114,9 +114,10 @@ def _fill_rays(
 ) -> None:
     """Mark the cells that the ray down from each point (n, 3) of the world to the table crosses while low ≤ x ≤ high in the plane's frame.
 
-    A ray stands for a column `RAY_SPACING_M` wide, so the slab is wider by half of that on either side.
+    A ray stands for a column `RAY_SPACING_M` wide, so the slab is wider by half of what such a column takes of its normal.
     """
-    T, near, far = T_plane_world, low - 0.5 * RAY_SPACING_M, high + 0.5 * RAY_SPACING_M
+    T, half = T_plane_world, 0.5 * RAY_SPACING_M * (abs(T_plane_world[0, 0]) + abs(T_plane_world[0, 1]))
+    near, far = low - half, high + half
     for r in range(len(points)):
         px, py, pz = points[r, 0], points[r, 1], points[r, 2]
         x = T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz + T[0, 3]

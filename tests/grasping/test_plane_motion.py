@@ -9,6 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from handey_studio.geometry import HeightField
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse
 from handey_studio.grasping import (
     GraspPlane,
@@ -18,6 +19,7 @@ from handey_studio.grasping import (
     grasp_groups,
     hand_in_plane,
     hand_outline,
+    opening_around,
     outline_with,
     plan_grasp_motion,
     plan_lowering,
@@ -27,7 +29,7 @@ from handey_studio.grasping import (
 from handey_studio.grasping.grasp_plane import CELL_M, HALF_SIZE_M
 from handey_studio.grasping.hand_outline import overlaps
 from handey_studio.grasping.plane_search import BIN_M, way_out
-from handey_studio.world import Block, Held, Library, World
+from handey_studio.world import Block, Held, Library, PlacedPart, World
 from handey_studio.world.collision import collision_model
 
 LIBRARY = Library.choose()
@@ -261,3 +263,40 @@ def test_no_intrusion_of_a_solid_is_missed(seed):
     beside = (np.abs(local[:, 0]) >= 0.025) & (np.abs(local[:, 0]) <= 0.025 + HAND.finger_thickness)
     assert plane.is_filled("fingers", local[beside][:, 1:]).all()
     assert plane.is_filled("crosspiece", local[np.abs(local[:, 0]) <= HAND.crosspiece_length / 2][:, 1:]).all()
+
+
+def cluttered(seed):
+    """A brick on the table, known blocks in the air and unknown ones standing around it."""
+    rng = np.random.default_rng(seed)
+    top, T_range = np.zeros((120, 120)), from_xyz_rpy((0.38, -0.12, 0.0))
+    for x, y in rng.uniform(-0.1, 0.1, (8, 2)):
+        if np.hypot(x, y) > 0.055:
+            (j, i), (a, b) = np.array([(y + 0.12) / 0.002, (x + 0.12) / 0.002]).astype(int), rng.integers(2, 9, 2)
+            top[j - a : j + a, i - b : i + b] = rng.uniform(0.02, 0.12)
+    blocks = tuple(
+        Block(f"b{k}", rng.uniform(0.01, 0.05, 3), from_xyz_rpy((0.5 + x, y, rng.uniform(0.02, 0.14)), rng.uniform(-3, 3, 3)))
+        for k, (x, y) in enumerate(rng.uniform(-0.12, 0.12, (4, 2)))
+        if np.hypot(x, y) > 0.06
+    )
+    placed = PlacedPart("brick#1", BRICK, from_xyz_rpy((0.5, 0.0, 0.015), (0.0, 0.0, rng.uniform(-3, 3))))
+    return World(ROBOT, blocks=blocks, parts=(placed,), terrain=HeightField(top, 0.002, T_range)), placed
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.integers(0, 10**6))
+def test_a_way_in_the_plane_is_a_way_in_the_world(seed):
+    """Oracle: the exact collision model. A bit of a column, whose edge a ray does not show, may be in the way."""
+    world, placed = cluttered(seed)
+    model, tried = collision_model(world), 0
+    for group in grasp_groups(BRICK, HAND)[0]:
+        opening, T_world_plane = opening_around(HAND, group.grasp_class.width), placed.T_world_part @ group.grasp_class.T_part_plane
+        T_world_hand = T_world_plane @ hand_in_plane(group.point, group.angle, 1)
+        if tried == 4 or T_world_hand[2, 2] > -0.3 or not model.hand_contact(T_world_hand, opening, limit=0.001).distance >= 0.001:
+            continue
+        tried += 1
+        plane = fill_grasp_plane(world, T_world_plane, group.point, HAND, opening)
+        run = plan_grasp_motion(plane, HAND, group, group.angle)
+        assert run.status in ("reached", "no way")
+        for pose in run.path[::3]:
+            if run.status == "reached":
+                assert model.hand_contact(T_world_plane @ hand_in_plane(pose[:2], pose[2], 1), opening, limit=0.002).distance > -0.0005
