@@ -47,11 +47,12 @@ def polytope(corners: NDArray) -> Polytope:
 
 def _distinct(directions: NDArray) -> NDArray:
     """Directions without those that repeat, or turn round, an earlier one."""
-    kept: list[NDArray] = []
+    kept, count = np.empty_like(directions), 0
     for direction in directions:
-        if all(np.linalg.norm(np.cross(direction, other)) > SAME_DIRECTION for other in kept):
-            kept.append(direction)
-    return np.array(kept)
+        if not ((kept[:count] @ direction) ** 2 >= 1.0 - SAME_DIRECTION**2).any():
+            kept[count] = direction
+            count += 1
+    return kept[:count]
 
 
 @lru_cache(maxsize=256)

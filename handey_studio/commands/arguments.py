@@ -68,6 +68,12 @@ def positive(text: str) -> int:
     return int(text)
 
 
+def whole(text: str) -> int:
+    if not text.isdigit() or int(text) > 1_000_000:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 0 to 1000000')
+    return int(text)
+
+
 def seeds(text: str) -> range:
     first, colon, end = text.partition(":")
     if not (first.isdigit() and (end.isdigit() or not colon)):

@@ -17,7 +17,7 @@ from handey_studio.motion.forbidden_ranges import product, turned
 from handey_studio.motion.query import Query
 from handey_studio.motion.regions import Regions, free_regions
 from handey_studio.motion.turning import Between, hinges_of
-from handey_studio.motion.wrist_box import dice
+from handey_studio.motion.wrist_box import balls_around
 from handey_studio.world import Robot, World
 from handey_studio.world.collision import collision_model
 from handey_studio.world.collision_bodies import robot_pieces
@@ -83,7 +83,7 @@ def inner_balls(robot: Robot) -> InnerBalls:
         if stage < 0 or piece.link > robot.carrier:
             continue
         planes, _ = faces_by_direction(piece.corners)
-        for centre in dice(piece.corners, DIE_M)[0]:
+        for centre in balls_around(piece.corners, DIE_M)[0]:
             depth = -float((planes[:, :3] @ centre + planes[:, 3]).max())
             if depth > LEAST_M:
                 centres.append(centre)

@@ -6,7 +6,7 @@ each other are looked at in the cells' centres only; there the path's certificat
 not hang on the wrist and is kept for the next question.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,10 +17,12 @@ from handey_studio.motion.certificate import Mover
 from handey_studio.motion.certificate import mover as mover_of
 from handey_studio.motion.distance_field import distance_field
 from handey_studio.motion.forbidden_ranges import first_ranges, second_ranges, third_ranges
+from handey_studio.motion.marching import DOUBT, FREE, SOLID
 from handey_studio.motion.self_collision import self_blocked
 from handey_studio.motion.turning import Between, angle_table, carried_circles, hinges_of, link_circles, reach_of
 from handey_studio.motion.wrist_box import WristBox, wrist_box
 from handey_studio.world import Held, Robot, World
+from handey_studio.world.world import EVERYWHERE, NO_TABLE
 
 TURN = 2 * np.pi
 COARSEST = float(np.deg2rad(5.1))  # cells wider than this leave too much in doubt to be worth while
@@ -56,7 +58,9 @@ class Extent:
 
     def of_one_turn(self, cells: NDArray) -> NDArray:
         """These cells, given all from the joints' limits on up to one turn."""
-        return cells[np.ix_(*((first + np.arange(n)) % self.turn for first, n in zip(self.first, self.counts, strict=True)))]
+        for axis in (2, 1, 0):
+            cells = cells.take((self.first[axis] + np.arange(self.counts[axis])) % self.turn, axis=axis)
+        return cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,18 +114,37 @@ def configuration_space(mover: Mover, wrists: NDArray, extent: Extent) -> tuple[
 
     Where the arm's own bodies are compared the other joints are as in the middle of their way.
     """
-    robot = mover.model.world.robot
-    way = tuple(tuple(posture) for posture in wrists.tolist())
-    carried = Carried(mover.model.world, mover.margin, mover.opening, mover.held, way)
-    blocked = _scene_cells(carried, extent.step) | _own_cells(carried, extent.step)[None]
-    return ConfigurationSpace(extent, robot.arm_index, extent.of_one_turn(blocked)), _box(carried)
+    world = mover.model.world
+    carried = Carried(world.robot, mover.margin, mover.opening, mover.held, tuple(tuple(posture) for posture in wrists.tolist()))
+    blocked = np.repeat(_own_cells(carried, extent.step)[None], len(_values(world.robot, extent.step)[0]), axis=0)
+    for obstacles in obstacles_apart(world):
+        blocked |= _scene_cells(obstacles, carried, extent.step) != FREE
+    return ConfigurationSpace(extent, world.robot.arm_index, extent.of_one_turn(blocked)), _box(carried)
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """What is looked at by itself: a world. Where it stands `among` others whose cells are known, nothing is asked that these settle."""
+
+    world: World
+    among: "Obstacles | None" = None
+
+
+def obstacles_apart(world: World) -> list[Obstacles]:
+    """The world in pieces that are free where all of them are: all that stays where it is, and each part by itself.
+
+    When a part moves, the cells of all the others are kept.
+    """
+    stays = Obstacles(replace(world, parts=()))
+    alone = [World(world.robot, NO_TABLE, parts=(placed,), free_space=EVERYWHERE) for placed in world.parts]
+    return [stays, *(Obstacles(one, stays) for one in alone)]
 
 
 @dataclass(frozen=True)
 class Carried:
-    """What a space hangs on: the world, the margin [m], and what the wrist carries along its way."""
+    """What a space hangs on besides the scene: the robot, the margin [m], and what the wrist carries along its way."""
 
-    world: World
+    robot: Robot
     margin: float
     opening: float
     held: Held | None
@@ -130,65 +153,62 @@ class Carried:
 
 @lru_cache(maxsize=64)
 def _box(carried: Carried) -> WristBox:
-    return wrist_box(carried.world.robot, np.array(carried.way), carried.opening, carried.held)
+    return wrist_box(carried.robot, np.array(carried.way), carried.opening, carried.held)
 
 
-@lru_cache(maxsize=16)
-def _scene_cells(carried: Carried, step: float) -> NDArray:
-    """Cells (n1, n2, n3), all within the limits up to one turn, that the scene does not leave wholly free; kept in this process.
+@lru_cache(maxsize=64)
+def _scene_cells(obstacles: Obstacles, carried: Carried, step: float) -> NDArray:
+    """What the cells (n1, n2, n3), all within the limits up to one turn, are with regard to obstacles; kept in this process.
 
     Only those are looked at which the cells of twice their width, up to `COARSEST`, leave in doubt.
     """
-    world, box = carried.world, _box(carried)
-    robot, values = world.robot, _values(world.robot, step)
+    robot, box, values = carried.robot, _box(carried), _values(carried.robot, step)
     held, reach = Between.of(robot, box.wrists), reach_of(robot, box)
-    rows, links = _link_cells(world, carried.margin, step, held, reach)
-    doubt = _doubt(_scene_cells(carried, 2 * step) if 2 * step < COARSEST else None, links.shape)
-    blocked, turns = links.copy(), angle_table(values[2])
-    circles = carried_circles(robot, box, carried.margin, held, step)
-    third_ranges(distance_field(world, reach), hinges_of(robot, held), circles, (values[0], values[1]), turns, step, rows, doubt, blocked)
-    return blocked
+    rows, links = _link_cells(obstacles, carried.margin, step, held, reach)
+    known = np.maximum(links, _scene_cells(obstacles.among, carried, step)) if obstacles.among else links
+    coarse = None if _coarsest(step) else _scene_cells(obstacles, carried, 2 * step)
+    field, circles = distance_field(obstacles.world, reach), carried_circles(robot, box, carried.margin, held, step)
+    places = (values[0], values[1])
+    return third_ranges(field, hinges_of(robot, held), circles, places, angle_table(values[2]), step, rows, coarse, known, links)
 
 
-@lru_cache(maxsize=8)
-def _link_cells(world: World, margin: float, step: float, held: Between, reach: float) -> tuple[NDArray, NDArray]:
-    """What links up to the carrier meet: rows (n1, n2) forbidden by those before it, and cells (n1, n2, n3), up to one turn each."""
-    robot, values = world.robot, _values(world.robot, step)
-    hinges, turns, field = hinges_of(robot, held), [angle_table(angles) for angles in values], distance_field(world, reach)
-    first, second, third = (link_circles(robot, stage, margin, held, step) for stage in range(3))
-    rows = second_ranges(field, hinges, second, values[0], turns[1], step, first_ranges(field, hinges, first, turns[0], step))
-    blocked = np.zeros((len(values[0]), len(values[1]), len(values[2])), bool)
-    blocked[rows] = True
-    doubt = _doubt(_link_cells(world, margin, 2 * step, held, reach)[1] if 2 * step < COARSEST else None, blocked.shape)
-    third_ranges(field, hinges, third, (values[0], values[1]), turns[2], step, rows, doubt, blocked)
-    return rows, blocked
+@lru_cache(maxsize=32)
+def _link_cells(obstacles: Obstacles, margin: float, step: float, held: Between, reach: float) -> tuple[NDArray, NDArray]:
+    """What links up to the carrier meet: rows (n1, n2) as those before it leave them, and cells (n1, n2, n3), up to one turn each."""
+    robot, coarsest = obstacles.world.robot, _coarsest(step)
+    values = _values(robot, step)
+    hinges, turns, field = hinges_of(robot, held), [angle_table(angles) for angles in values], distance_field(obstacles.world, reach)
+    circles = [link_circles(robot, stage, margin, held, step) for stage in range(3)]
+    known_rows, known = _link_cells(obstacles.among, margin, step, held, reach) if obstacles.among else (None, None)
+    first, rows = np.full(len(values[0]), DOUBT, np.int8), np.full((len(values[0]), len(values[1])), DOUBT, np.int8)
+    if known_rows is not None:
+        rows[known_rows == SOLID if coarsest else known_rows != FREE] = FREE  # which asks nothing
+    first_ranges(field, hinges, circles[0], turns[0], step, coarsest, first)
+    second_ranges(field, hinges, circles[1], values[0], turns[1], step, coarsest, first, rows)
+    coarse = None if coarsest else _link_cells(obstacles, margin, 2 * step, held, reach)[1]
+    places = (values[0], values[1])
+    return rows, third_ranges(field, hinges, circles[2], places, turns[2], step, rows, coarse, known, None)
 
 
 @lru_cache(maxsize=32)
 def _own_cells(carried: Carried, step: float) -> NDArray:
     """Cells (n2, n3) in which the arm meets itself, seen at the centres of the coarsest cells."""
-    robot = carried.world.robot
-    values = _values(robot, step)
-    if 2 * step < COARSEST:
-        return _doubt(_own_cells(carried, 2 * step), (len(values[1]), len(values[2])))
+    values = _values(carried.robot, step)
+    if not _coarsest(step):
+        wide = _own_cells(carried, 2 * step).repeat(2, axis=0).repeat(2, axis=1)[: len(values[1]), : len(values[2])]
+        return np.pad(wide, [(0, len(values[1]) - wide.shape[0]), (0, len(values[2]) - wide.shape[1])], constant_values=True)
     way = np.array(carried.way)
     middle = way[len(way) // 2] if len(way) > 2 else way.mean(axis=0)
-    mine = mover_of(carried.world, carried.opening, carried.held, (), carried.margin)
+    mine = mover_of(World(carried.robot), carried.opening, carried.held, (), carried.margin)
     return self_blocked(mine, values[1], values[2], middle)
+
+
+def _coarsest(step: float) -> bool:
+    """Whether there are no cells of twice that width."""
+    return 2 * step > COARSEST
 
 
 def _values(robot: Robot, step: float) -> tuple[NDArray, ...]:
     """Centres [rad] of all cells within the limits, up to one turn."""
     extent = extent_around(robot, step)
     return tuple(centres[: extent.turn] for centres in extent.centres)
-
-
-def _doubt(coarse: NDArray | None, shape: tuple[int, ...]) -> NDArray:
-    """Cells that are not known to be free from blocked cells of twice their width; all, if there are none."""
-    doubt = np.ones(shape, bool)
-    if coarse is not None:
-        for axis in range(coarse.ndim):
-            coarse = coarse.repeat(2, axis=axis)
-        inside = tuple(slice(min(a, b)) for a, b in zip(shape, coarse.shape, strict=True))
-        doubt[inside] = coarse[inside]
-    return doubt

@@ -16,22 +16,25 @@ from scipy.spatial import ConvexHull
 
 from handey_studio.geometry import HeightField
 from handey_studio.world import World
-from handey_studio.world.collision import collision_model
+from handey_studio.world.collision import CollisionModel, collision_model
 from handey_studio.world.collision_bodies import Obstacles, terrain_obstacles
 
 CLIP_M = 0.4  # farther than this nothing is told apart: more than a cell of the configuration space moves anything
+AROUND_PART_M = 0.15  # the grid of a part alone; its box tells how far it is from farther off
 FINEST_M = 0.01
 MOST_VOXELS = 800_000
 ROUND_M = 0.1  # grids begin and end at multiples of this, so that worlds that differ in one part share theirs
 
 
 class Field(NamedTuple):
-    """`values[i, j, k]` [m] is a lower bound of the distance between any point of a voxel, `cell` [m] wide, `low` (3,) the grid's lower
-    corner, and what is solid, up to `clip`. The table and the walls of the free space `free` (2, 3) are planes apart from it.
+    """`values[i, j, k]` [m] is a lower bound of the distance between any point of a voxel and what is solid, which is at least `clip` [m]
+    inside the grid: voxels `cell` [m] wide, `voxels` to a metre, `low` (3,) the grid's lower corner. The table and the walls of the free
+    space `free` (2, 3), which ends where the arm does not get, are planes apart from it.
     """
 
     low: NDArray
     cell: float
+    voxels: float
     values: NDArray
     clip: float
     table_z: float
@@ -46,33 +49,39 @@ class Grid(NamedTuple):
     counts: tuple[int, ...]
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def distance_field(world: World, reach: float) -> Field:
     """The field of a world's blocks, parts and depth map as far as the arm with all that it carries may reach [m], kept in this process."""
-    model = collision_model(world)
-    grid = _grid(world, reach)
-    values = _terrain_distances(world.terrain, world.table_z, float(world.free_space[1, 2]), grid).copy()
+    model, shoulder = collision_model(world), world.robot.T_world_base[:3, 3]
+    far = reach + CLIP_M
+    free = np.array([np.maximum(world.free_space[0], shoulder - far), np.minimum(world.free_space[1], shoulder + far)])
+    alone = world.terrain is None and not world.blocks
+    clip, most = (AROUND_PART_M, 2 * far) if alone else (CLIP_M, CLIP_M)
+    grid = _grid(model, max(world.table_z, float(free[0, 2])), free, clip)
+    if alone:
+        values = np.full(grid.counts, most, np.float32)
+    else:
+        values = _terrain_distances(world.terrain, world.table_z, float(world.free_space[1, 2]), grid).copy()
     low, solids = np.array(grid.low), model.solids
     for k in range(model.slabs, len(solids.name)):
         corners = solids.corners[solids.first[k] : solids.first[k + 1]]
         planes, groups = faces_by_direction(corners)
-        _stamp(values, planes, groups, corners.min(axis=0), corners.max(axis=0), low, grid.cell, CLIP_M)
-    return Field(low, grid.cell, values, CLIP_M, float(world.table_z), np.array(world.free_space))
+        _stamp(values, planes, groups, corners.min(axis=0), corners.max(axis=0), low, grid.cell, most)
+    return Field(low, grid.cell, 1.0 / grid.cell, values, clip, float(world.table_z), free)
 
 
-def _grid(world: World, reach: float) -> Grid:
-    """The grid over all bodies but the table and the outside, as far as they matter, and `CLIP_M` around them."""
-    model, shoulder = collision_model(world), world.robot.T_world_base[:3, 3]
-    boxes = np.concatenate([_spans(model.solids)[model.slabs :], _spans(model.terrain)])
-    far = reach + CLIP_M
-    lowest = [*world.free_space[0, :2], max(world.table_z, world.free_space[0, 2])]
-    boxes[:, 0] = np.maximum(boxes[:, 0], np.maximum(shoulder - far, lowest))
-    boxes[:, 1] = np.minimum(boxes[:, 1], np.minimum(shoulder + far, world.free_space[1]))
+def _grid(model: CollisionModel, bottom: float, free: NDArray, margin: float) -> Grid:
+    """The grid over all bodies but the table and the outside, as far as they are in the space `free` (2, 3) [m], and `margin` around them;
+    nothing below `bottom` [m].
+    """
+    boxes = np.concatenate([_spans(model.solids)[model.slabs :], _column_spans(model.terrain)])
+    boxes = np.stack([np.maximum(boxes[:, 0], [*free[0, :2], bottom]), np.minimum(boxes[:, 1], free[1])], axis=1)
     boxes = boxes[(boxes[:, 1] > boxes[:, 0]).all(axis=1)]
     if not len(boxes):
-        return Grid((0.0, 0.0, 0.0), FINEST_M, (1, 1, 1))
-    low = np.floor((boxes[:, 0].min(axis=0) - CLIP_M) / ROUND_M) * ROUND_M
-    high = np.ceil((boxes[:, 1].max(axis=0) + CLIP_M) / ROUND_M) * ROUND_M
+        return Grid((0.0, 0.0, bottom if np.isfinite(bottom) else 0.0), FINEST_M, (0, 0, 0))
+    low = np.floor((boxes[:, 0].min(axis=0) - margin) / ROUND_M) * ROUND_M
+    low[2] = max(low[2], bottom)
+    high = np.ceil((boxes[:, 1].max(axis=0) + margin) / ROUND_M) * ROUND_M
     cell = max(FINEST_M, float(np.cbrt(np.prod(high - low) / MOST_VOXELS)))
     return Grid(tuple(low.tolist()), cell, tuple(np.ceil((high - low) / cell).astype(int).tolist()))
 
@@ -83,6 +92,12 @@ def _spans(fixed: Obstacles) -> NDArray:
         return np.empty((0, 2, 3))
     starts = fixed.first[:-1]
     return np.stack([np.minimum.reduceat(fixed.corners, starts), np.maximum.reduceat(fixed.corners, starts)], axis=1)
+
+
+def _column_spans(terrain: Obstacles) -> NDArray:
+    """Lower and upper corners (k, 2, 3) [m] of the depth map's columns, as their tree has them."""
+    leaves = (terrain.tree.left < 0) & (terrain.tree.right >= 0)
+    return np.stack([terrain.tree.low[leaves], terrain.tree.high[leaves]], axis=1)
 
 
 def faces_by_direction(corners: NDArray) -> tuple[NDArray, NDArray]:
@@ -141,8 +156,10 @@ def _terrain_distances(terrain: HeightField | None, table_z: float, ceiling: flo
     if terrain is None:
         return values
     tops = np.zeros(grid.counts[:2], np.int64)
-    _fill_columns(tops, grid.counts[2], _spans(terrain_obstacles(terrain, table_z, ceiling)), np.array(grid.low), grid.cell)
-    return column_distances(tops, grid.counts[2], grid.cell, CLIP_M)
+    _fill_columns(tops, grid.counts[2], _column_spans(terrain_obstacles(terrain, table_z, ceiling)), np.array(grid.low), grid.cell)
+    near = min(grid.counts[2], int(tops.max(initial=0)) + 1 + int(np.ceil(CLIP_M / grid.cell)))
+    values[:, :, :near] = column_distances(tops, near, grid.cell, CLIP_M)
+    return values
 
 
 @njit(cache=True)
@@ -189,13 +206,14 @@ def _spread(squares: NDArray, gaps: NDArray, out: NDArray) -> None:
 
 @njit(cache=True)
 def clearance_at(field: Field, x: float, y: float, z: float) -> float:
-    """A lower bound [m] of the distance from a point to everything solid; at most `clip` away from the planes."""
+    """A lower bound [m] of the distance from a point, which the arm may reach, to everything solid."""
     bound = min(z - field.table_z, x - field.free[0, 0], field.free[1, 0] - x, y - field.free[0, 1], field.free[1, 1] - y)
     bound = min(bound, z - field.free[0, 2], field.free[1, 2] - z)
-    i = int(np.floor((x - field.low[0]) / field.cell))
-    j = int(np.floor((y - field.low[1]) / field.cell))
-    k = int(np.floor((z - field.low[2]) / field.cell))
+    u, v, w = (x - field.low[0]) * field.voxels, (y - field.low[1]) * field.voxels, (z - field.low[2]) * field.voxels
     nx, ny, nz = field.values.shape
-    if i < 0 or j < 0 or k < 0 or i >= nx or j >= ny or k >= nz:
-        return min(bound, field.clip)
-    return min(bound, field.values[i, j, k])
+    if u >= 0.0 and v >= 0.0 and w >= 0.0 and u < nx and v < ny and w < nz:
+        return min(bound, field.values[int(u), int(v), int(w)])
+    if nx == 0:
+        return bound
+    u, v, w = max(-u, u - nx, 0.0), max(-v, v - ny, 0.0), max(-w, w - nz, 0.0)
+    return min(bound, field.clip + field.cell * np.sqrt(u * u + v * v + w * w))

@@ -9,7 +9,7 @@ from handey_studio.motion.cores import share
 from handey_studio.world.collision_bodies import Shapes
 from handey_studio.world.collision_queries import Chain, body_distance, forward, placed
 
-FAR_M = 0.15  # distances are told apart up to here
+NEAR_M = 0.03  # nearer than this the bodies themselves are measured, farther off the balls around them will do
 
 
 def self_blocked(mover: Mover, values2: NDArray, values3: NDArray, others: NDArray) -> NDArray:
@@ -91,13 +91,13 @@ def _ranges(
             q[arm[1]], q[arm[2]] = values2[j], values3[m]
             distance = _least(shapes, balls, forward(chain, q), opening, corners)
             blocked[j, m] = distance <= 0.0
-            m += 1 + int(distance / (step * reach))
+            m += 1 + int(min(distance / (step * reach), float(len(values3))))
 
 
 @njit(cache=True)
 def _least(shapes: Shapes, balls: NDArray, poses: NDArray, opening: float, corners: NDArray) -> float:
-    """The least distance [m], up to `FAR_M`, of two bodies; their corners are placed only where the balls around them come near."""
-    least, placed = FAR_M, np.zeros(len(balls), np.bool_)
+    """A lower bound of the least distance [m] of two bodies, which where it is below `NEAR_M` is that distance."""
+    least, placed = np.inf, np.zeros(len(balls), np.bool_)
     centres = np.empty((len(balls), 3))
     for b in range(len(balls)):
         T = poses[shapes.link[b]]
@@ -106,7 +106,9 @@ def _least(shapes: Shapes, balls: NDArray, poses: NDArray, opening: float, corne
     for pair in range(len(shapes.pairs)):
         a, b = int(shapes.pairs[pair, 0]), int(shapes.pairs[pair, 1])
         x, y, z = centres[a, 0] - centres[b, 0], centres[a, 1] - centres[b, 1], centres[a, 2] - centres[b, 2]
-        if np.sqrt(x * x + y * y + z * z) - balls[a, 3] - balls[b, 3] >= least:
+        apart = np.sqrt(x * x + y * y + z * z) - balls[a, 3] - balls[b, 3]
+        if apart >= min(least, NEAR_M):
+            least = min(least, apart)
             continue
         for body in (a, b):
             if not placed[body]:

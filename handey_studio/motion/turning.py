@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import inverse
-from handey_studio.motion.forbidden_ranges import Circles, Hinges
+from handey_studio.motion.forbidden_ranges import Hinges
+from handey_studio.motion.marching import Circles
 from handey_studio.motion.wrist_box import WristBox, gather, link_balls
 from handey_studio.world import Robot, arm_of
 
@@ -75,20 +76,22 @@ def reach_of(robot: Robot, box: WristBox) -> float:
 
 
 def _circles(robot: Robot, stage: int, centres: NDArray, radii: NDArray, slack: NDArray) -> Circles:
-    """The circles of balls, those near one another together, and of the big balls around them."""
+    """The circles of balls, those near one another together, of the big balls around them, and of one around all."""
     low, high = centres.min(axis=0), centres.max(axis=0)
     around, around_radii, groups = gather(centres, radii, low, high, GROUP_M)
     far = np.argsort(-np.linalg.norm(around, axis=1), kind="stable")  # what is far out meets something most often
     around, around_radii, groups = around[far], around_radii[far], np.argsort(far)[groups]
     order = np.argsort(groups, kind="stable")
     first = np.searchsorted(groups[order], np.arange(len(around) + 1))
-    places = np.concatenate([centres[order], around])
+    middle_of_all = (low + high) / 2
+    top = float((np.linalg.norm(centres - middle_of_all, axis=1) + radii).max())
+    places = np.concatenate([centres[order], around, middle_of_all[None]])
     most = np.maximum.reduceat(slack[order], first[:-1])
     axis = np.array(arm_of(robot).axes[robot.arm_index[stage]])
     middle = (places @ axis)[:, None] * axis
     across = places - middle
     distance = np.linalg.norm(across, axis=1)
-    all_radii, all_slack = np.concatenate([radii[order], around_radii]), np.concatenate([slack[order], most])
+    all_radii, all_slack = np.concatenate([radii[order], around_radii, [top]]), np.concatenate([slack[order], most, [most.max()]])
     return Circles(middle, across, np.cross(axis, across), distance, all_radii, all_slack, first)
 
 

@@ -13,18 +13,20 @@ import manifold3d
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.transforms import inverse
 from handey_studio.world import Held, Robot, arm_of
 from handey_studio.world.collision_bodies import Piece, held_pieces, robot_pieces
 
-CHIP_M = 0.025  # what the wrist carries is diced this fine before it is gathered into spheres
+CHIP_EXCESS_M = 0.01  # how far balls reach out of what the wrist carries, before they are gathered into bigger ones
 SWEEP_M = 0.01  # how far anything may move from one sampled wrist posture to the next
-LINK_BALLS_M = 0.04  # the links before the one that carries the wrist pass close above the table
-CARRIER_BALLS_M = 0.06
-BALL_SIZES_M = (0.04, 0.05, 0.06, 0.08, 0.10, 0.14, 0.20)
-MOST_BALLS = 90
+LINK_EXCESS_M = 0.02  # and out of links: with 3 cm the UR5's shoulder would be in its table
+SMALL = 1.5  # excesses: sharp edges are not worth balls that are smaller
+STEPS_TO_CENTRE = 100
+BALL_SIZES_M = (0.04, 0.05, 0.06, 0.07, 0.08, 0.10, 0.14, 0.20)
+MOST_BALLS = 40
 
 Balls = tuple[NDArray, NDArray]  # centres (k, 3), radii (k,) [m]
 
@@ -77,30 +79,59 @@ def link_balls(robot: Robot) -> tuple[NDArray, NDArray, NDArray]:
 
 @lru_cache(maxsize=8)
 def _robot_balls(robot: Robot) -> tuple[tuple[Piece, Balls], ...]:
-    def size(link: int) -> float:
-        return CHIP_M if link > robot.carrier else CARRIER_BALLS_M if link == robot.carrier else LINK_BALLS_M
+    def excess(link: int) -> float:
+        return CHIP_EXCESS_M if link > robot.carrier else LINK_EXCESS_M
 
-    return tuple((piece, dice(piece.corners, size(piece.link))) for piece in robot_pieces(robot))
+    return tuple((piece, balls_around(piece.corners, excess(piece.link))) for piece in robot_pieces(robot))
 
 
 @lru_cache(maxsize=32)
 def _held_balls(robot: Robot, held: Held) -> tuple[tuple[Piece, Balls], ...]:
-    return tuple((piece, dice(piece.corners, CHIP_M)) for piece in held_pieces(robot, held))
+    return tuple((piece, balls_around(piece.corners, CHIP_EXCESS_M)) for piece in held_pieces(robot, held))
 
 
-def dice(corners: NDArray, size: float) -> Balls:
-    """Balls around the dice, at most `size` [m] wide, that a convex body, corners (k, 3) [m], is cut into."""
-    dies = [manifold3d.Manifold.hull_points(np.array(corners))]
+def balls_around(corners: NDArray, excess: float) -> Balls:
+    """Balls that together hold a convex body, corners (k, 3) [m], each reaching out of the body by about `excess` [m] at most.
+
+    The body is halved across its longest side until the ball around each piece is that tight or `SMALL`: round links take few.
+    """
+    planes = ConvexHull(corners).equations
+    todo, centres, radii = [manifold3d.Manifold.hull_points(np.array(corners))], [], []
+    while todo:
+        piece = todo.pop()
+        points = np.asarray(piece.to_mesh64().vert_properties)[:, :3]
+        centre, radius = _ball_around(points)
+        depth = -float((planes[:, :3] @ centre + planes[:, 3]).max())
+        if radius - depth <= excess or radius <= SMALL * excess:
+            centres.append(centre)
+            radii.append(radius)
+            continue
+        low, high = points.min(axis=0), points.max(axis=0)
+        longest = int(np.argmax(high - low))
+        halves = piece.split_by_plane(tuple(np.eye(3)[longest]), float((low + high)[longest]) / 2)
+        todo += [half for half in halves if not half.is_empty()]
+    return np.array(centres), np.array(radii)
+
+
+@njit(cache=True)
+def _ball_around(points: NDArray) -> tuple[NDArray, float]:
+    """Centre (3,) and radius [m] of a ball around points (k, 3), nearly the least: the centre steps towards the farthest point, by less and
+    less (Bădoiu & Clarkson 2003)."""
+    centre, best, least = np.empty(3), np.empty(3), np.inf
     for axis in range(3):
-        low, high = corners[:, axis].min(), corners[:, axis].max()
-        cuts = np.linspace(low, high, 1 + int(np.ceil((high - low) / size)))[1:-1]
-        for cut in cuts:
-            halves = [half for die in dies for half in die.split_by_plane(tuple(np.eye(3)[axis]), float(cut))]
-            dies = [half for half in halves if not half.is_empty()]
-    points = [np.asarray(die.to_mesh64().vert_properties)[:, :3] for die in dies]
-    centres = np.array([(p.min(axis=0) + p.max(axis=0)) / 2 for p in points])
-    radii = np.array([np.linalg.norm(p - c, axis=1).max() for p, c in zip(points, centres, strict=True)])
-    return centres, radii
+        centre[axis] = (points[:, axis].min() + points[:, axis].max()) / 2
+    for step in range(STEPS_TO_CENTRE):
+        most, far = -1.0, 0
+        for p in range(len(points)):
+            x, y, z = points[p, 0] - centre[0], points[p, 1] - centre[1], points[p, 2] - centre[2]
+            square = x * x + y * y + z * z
+            if square > most:
+                most, far = square, p
+        if most < least:
+            least = most
+            best[:] = centre
+        centre += (points[far] - centre) * (0.5 / (step + 2))
+    return best, np.sqrt(least)
 
 
 @njit(cache=True)

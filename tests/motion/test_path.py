@@ -11,6 +11,7 @@ from handey_studio.motion import (
     certify,
     distance_field,
     forbidden_ranges,
+    marching,
     plan_path,
     proof,
     regions,
@@ -231,6 +232,7 @@ def test_warmed_up_nothing_is_left_to_compile():
 
 def _signatures() -> dict[str, int]:
     """Compiled versions of each function of collision and motion."""
-    modules = (gjk, collision_queries, proof, forbidden_ranges, distance_field, search, regions, self_collision, three_legs, wrist_box)
+    planning = (proof, marching, forbidden_ranges, distance_field, search, regions, self_collision, three_legs, wrist_box)
+    modules = (gjk, collision_queries, *planning)
     functions = [(m.__name__, f) for m in modules for f in vars(m).values() if hasattr(f, "signatures") and f.__module__ == m.__name__]
     return {f"{name}.{f.__name__}": len(f.signatures) for name, f in functions}

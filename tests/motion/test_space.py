@@ -1,5 +1,7 @@
 """The distance field, the balls and the configuration space: what is called free is free."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,13 +12,14 @@ from scipy.sparse.csgraph import dijkstra
 
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import inverse, transform
+from handey_studio.motion import configuration_space as configuration_space_module
 from handey_studio.motion.certificate import Mover, mover
 from handey_studio.motion.configuration_space import ConfigurationSpace, configuration_space, extent_around
 from handey_studio.motion.distance_field import clearance_at, column_distances, distance_field, faces_by_direction
 from handey_studio.motion.regions import free_regions, nearest_cells, region_distances
 from handey_studio.motion.search import find_cells
 from handey_studio.motion.wrist_box import link_balls, wrist_box
-from handey_studio.world import Held, Part, arm_of
+from handey_studio.world import Held, Part, PlacedPart, arm_of
 from handey_studio.world.collision import collision_model
 from handey_studio.world.collision_bodies import held_pieces, robot_pieces
 from handey_studio.world.gjk import distance
@@ -93,7 +96,8 @@ def test_balls_enclose_the_arm_and_all_that_the_wrist_carries():
 def test_a_free_cell_is_free_all_over(held, step_deg, seed):
     """The naive oracle: exact collision somewhere in the cell, at some place of the wrist's way."""
     rng = np.random.default_rng(4)
-    mine = mover(scene(seed), 0.05, held)
+    stands = PlacedPart("stands", Part("stands", box([0.06, 0.06, 0.3])), transform(None, [0.35, 0.15, 0.15]))
+    mine = mover(replace(scene(seed), parts=(stands,)), 0.05, held)
     space = space_of(mine, WRISTS, step_deg, np.array([ROBOT.home]))
     free = np.argwhere(~space.blocked)
     assert 0.02 < len(free) / space.blocked.size < 0.7
@@ -103,6 +107,25 @@ def test_a_free_cell_is_free_all_over(held, step_deg, seed):
         q[3:] = WRISTS[0] + rng.random() * (WRISTS[1] - WRISTS[0])
         clearance = mine.clearance(q)
         assert clearance.keeps(mine.margin) or set(clearance.bodies) <= OWN, clearance
+
+
+def test_a_moved_part_costs_only_its_own():
+    """The space after a part moved is that of a fresh process, though all that stays is kept; and both parts count, at either step."""
+    brick = Part("brick", box([0.05, 0.08, 0.12]))
+    here, there = (transform(None, [0.4, y, 0.06]) for y in (-0.1, 0.3))
+    world = replace(scene(2), parts=(PlacedPart("brick#1", brick, here), PlacedPart("brick#2", brick, transform(None, [0.2, 0.4, 0.1]))))
+    moved = world.with_part(PlacedPart("brick#1", brick, there))
+    for step_deg in (5.0, 2.5):
+        first = space_of(mover(world, 0.05), WRISTS, step_deg, np.array([ROBOT.home]))
+        asked = configuration_space_module._scene_cells.cache_info().misses
+        kept = space_of(mover(moved, 0.05), WRISTS, step_deg, np.array([ROBOT.home]))
+        assert configuration_space_module._scene_cells.cache_info().misses - asked == 1
+        for cached in ("_scene_cells", "_link_cells"):
+            getattr(configuration_space_module, cached).cache_clear()
+        assert (space_of(mover(moved, 0.05), WRISTS, step_deg, np.array([ROBOT.home])).blocked == kept.blocked).all()
+        bare = space_of(mover(replace(world, parts=()), 0.05), WRISTS, step_deg, np.array([ROBOT.home]))
+        assert (first.blocked & ~bare.blocked).any() and (kept.blocked & ~bare.blocked).any()
+        assert not (bare.blocked & ~first.blocked).any() and (first.blocked != kept.blocked).any()
 
 
 def test_blocked_cells_are_not_all_empty_air():

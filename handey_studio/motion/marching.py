@@ -1,0 +1,240 @@
+"""Along one row of cells: while one joint turns and those before it stand still, the balls of the arm run around circles; compiled.
+
+At a cell's centre a ball needs as much clearance as half a cell of each joint can move it. What it has beyond that lasts for some cells
+more, and so does what it lacks: a row is looked at in strides, and the cost grows with the surface of what is forbidden, not with the cells
+in it. A cell is FREE, or in DOUBT when it is not wholly free, or SOLID when already its centre collides.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from handey_studio.motion.distance_field import Field, clearance_at
+
+FREE, DOUBT, SOLID = 0, 1, 2
+LACKING = 3  # while a row is looked at: what was in doubt and is not free; what stays in doubt becomes free
+
+
+class Circles(NamedTuple):
+    """Balls that a joint carries, in the frame of its hinge: at angle θ ball s is at `middle[s] + cos θ·across[s] + sin θ·along[s]`.
+
+    `distance` (k,) [m] is a circle's radius, `radius` (k,) [m] the ball's with the margin, `slack` (k,) [m] what joints that are not the
+    arm's may move it. After the balls come g = `len(first) - 1` big ones, number i of them around the
+    balls `first[i]` to `first[i + 1] - 1`, and one around all, so that one look often answers for many.
+    """
+
+    middle: NDArray
+    across: NDArray
+    along: NDArray
+    distance: NDArray
+    radius: NDArray
+    slack: NDArray
+    first: NDArray
+
+
+@njit(cache=True)
+def place(T: NDArray, these: Circles, out: NDArray) -> None:
+    """Middle, across and along, out (k, 9), of circles in the frame that T maps to."""
+    for s in range(len(out)):
+        for axis in range(3):
+            a, b, c = T[axis, 0], T[axis, 1], T[axis, 2]
+            out[s, axis] = a * these.middle[s, 0] + b * these.middle[s, 1] + c * these.middle[s, 2] + T[axis, 3]
+            out[s, 3 + axis] = a * these.across[s, 0] + b * these.across[s, 1] + c * these.across[s, 2]
+            out[s, 6 + axis] = a * these.along[s, 0] + b * these.along[s, 1] + c * these.along[s, 2]
+
+
+@njit(cache=True)
+def need_of(circle: NDArray, start: float, turns: NDArray, before: NDArray, half: float, out: NDArray) -> None:
+    """The clearance (n,) [m] that a ball needs at each of n angles with `turns` (n, 2) cosine and sine; `start` without what moves it.
+
+    `before` (b, 6) are the point and direction of the axes of the arm joints before, the nearest first, in the circles' frame. The joints
+    move one by one, from the last to the first: a point at distance r of an axis, displaced by D already, is moved by `half`·(r + D) more.
+    """
+    for m in range(len(turns)):
+        c, d = turns[m]
+        x = circle[0] + c * circle[3] + d * circle[6]
+        y = circle[1] + c * circle[4] + d * circle[7]
+        z = circle[2] + c * circle[5] + d * circle[8]
+        moved = start
+        for b in range(len(before)):
+            u, v, w = x - before[b, 0], y - before[b, 1], z - before[b, 2]
+            along = u * before[b, 3] + v * before[b, 4] + w * before[b, 5]
+            moved += half * (np.sqrt(max(u * u + v * v + w * w - along * along, 0.0)) + moved)
+        out[m] = moved
+
+
+@njit(cache=True)
+def needs(local: NDArray, these: Circles, first: int, last: int, turns: NDArray, before: NDArray, half: float, out: NDArray) -> None:
+    """Fills in the needs (k, n) [m] of the balls `first` to `last` - 1."""
+    for s in range(first, last):
+        need_of(local[s], half * these.distance[s] + these.slack[s], turns, before, half, out[s])
+        out[s] += these.radius[s]
+
+
+class Work(NamedTuple):
+    """Room for what is found out on the way: the `need` (k, n) [m] of each ball at each angle; which groups' small balls are in it, `known`
+    (groups,); and two sets of cells of a row (n,).
+    """
+
+    need: NDArray
+    known: NDArray
+    around: NDArray
+    near: NDArray
+
+
+@njit(cache=True)
+def room(balls: int, groups: int, angles: int) -> Work:
+    """Room for the work on rows of so many angles."""
+    return Work(np.empty((balls, angles)), np.zeros(groups, np.bool_), np.empty(angles, np.bool_), np.empty(angles, np.bool_))
+
+
+@njit(cache=True)
+def march(
+    field: Field,
+    T: NDArray,
+    local: NDArray,
+    these: Circles,
+    turns: NDArray,
+    before: NDArray,
+    step: float,
+    tell: bool,
+    work: Work,
+    row: NDArray,
+) -> None:
+    """Settles those cells of a row (n,) that are in doubt. With `tell` solid ones are told from those that stay in doubt.
+
+    Its circles are `local` (k, 9) in a frame that T (4, 4) maps to the world. The ball around all goes first, then that of each group; the
+    small ones look only where it lacks clearance, and their needs are filled in when first asked for.
+    """
+    begin, end = _doubtful(row)
+    if begin == end:
+        return
+    groups = len(these.first) - 1
+    small, top = len(local) - groups - 1, len(local) - 1
+    work.around[begin:end] = row[begin:end] == DOUBT
+    if _lacks(field, T, local, these.distance, top, turns, work.need, step, work.around, work.near, begin, end):
+        work.around[begin:end] = work.near[begin:end]
+        for group in range(groups):
+            first, last = these.first[group], these.first[group + 1]
+            if not _lacks(field, T, local, these.distance, small + group, turns, work.need, step, work.around, work.near, begin, end):
+                continue
+            if not work.known[group]:
+                needs(local, these, first, last, turns, before, step / 2, work.need)
+                work.known[group] = True
+            for s in range(first, last):
+                _mark(field, T, local, these, s, turns, work.need, step, tell, work.near, row, begin, end)
+    for m in range(begin, end):
+        row[m] = FREE if row[m] == DOUBT else DOUBT if row[m] == LACKING else row[m]
+
+
+@njit(cache=True)
+def _doubtful(row: NDArray) -> tuple[int, int]:
+    """From where to where a row has cells in doubt."""
+    begin, end = 0, len(row)
+    while begin < end and row[begin] != DOUBT:
+        begin += 1
+    while end > begin and row[end - 1] != DOUBT:
+        end -= 1
+    return begin, end
+
+
+@njit(cache=True)
+def _image(T: NDArray, circles: NDArray, s: int, part: int, shift: float) -> tuple[float, float, float]:
+    """Middle (`part` 0, `shift` 1), across or along (3, 6; 0) of a circle in the frame that T maps to."""
+    a, b, c = circles[s, part], circles[s, part + 1], circles[s, part + 2]
+    return (
+        T[0, 0] * a + T[0, 1] * b + T[0, 2] * c + shift * T[0, 3],
+        T[1, 0] * a + T[1, 1] * b + T[1, 2] * c + shift * T[1, 3],
+        T[2, 0] * a + T[2, 1] * b + T[2, 2] * c + shift * T[2, 3],
+    )
+
+
+@njit(cache=True)
+def _stretch(distance: float, step: float) -> float:
+    """Cells for each metre of clearance: a need changes at most by 2·half + half² of how far the ball moves (see `need_of`)."""
+    return 1.0 / ((distance + 1e-9) * step * (1.0 + step / 2.0) ** 2)
+
+
+@njit(cache=True)
+def _lacks(
+    field: Field,
+    T: NDArray,
+    local: NDArray,
+    distance: NDArray,
+    s: int,
+    turns: NDArray,
+    need: NDArray,
+    step: float,
+    cells: NDArray,
+    lacking: NDArray,
+    begin: int,
+    end: int,
+) -> bool:
+    """Marks as `lacking` (n,) those of the cells (n,) from `begin` to `end` in which a big ball lacks clearance; whether any does."""
+    x, y, z = _image(T, local, s, 0, 1.0)
+    a, b, c = _image(T, local, s, 3, 0.0)
+    u, v, w = _image(T, local, s, 6, 0.0)
+    found, m, stretch = False, begin, _stretch(distance[s], step)
+    lacking[begin:end] = False
+    while m < end:
+        if not cells[m]:
+            m += 1
+            continue
+        p, q = turns[m, 0], turns[m, 1]
+        over = clearance_at(field, x + p * a + q * u, y + p * b + q * v, z + p * c + q * w) - need[s, m]
+        if over >= 0.0:
+            m += 1 + int(min(over * stretch, float(end)))
+            continue
+        last = min(end, m + 1 + int(min(max(-over - field.cell, 0.0) * stretch, float(end))))
+        for k in range(m, last):
+            lacking[k] = cells[k]
+        found, m = True, last
+    return found
+
+
+@njit(cache=True)
+def _mark(
+    field: Field,
+    T: NDArray,
+    local: NDArray,
+    these: Circles,
+    s: int,
+    turns: NDArray,
+    need: NDArray,
+    step: float,
+    tell: bool,
+    near: NDArray,
+    row: NDArray,
+    begin: int,
+    end: int,
+) -> None:
+    """Marks the cells of a row from `begin` to `end`, those that are `near`, in which one ball lacks clearance or collides."""
+    x, y, z = _image(T, local, s, 0, 1.0)
+    a, b, c = _image(T, local, s, 3, 0.0)
+    u, v, w = _image(T, local, s, 6, 0.0)
+    m, stretch, radius = begin, _stretch(these.distance[s], step), these.radius[s]
+    while m < end:
+        if not near[m] or row[m] == SOLID or (row[m] == LACKING and not tell):
+            m += 1
+            continue
+        p, q = turns[m, 0], turns[m, 1]
+        clearance = clearance_at(field, x + p * a + q * u, y + p * b + q * v, z + p * c + q * w)
+        over = clearance - need[s, m]
+        if over >= 0.0:
+            m += 1 + int(min(over * stretch, float(end)))
+            continue
+        last = min(end, m + 1 + int(min(max(-over - field.cell, 0.0) * stretch, float(end))))
+        for k in range(m, last):
+            if row[k] == DOUBT:
+                row[k] = LACKING
+        if not tell:
+            m = last
+        elif clearance >= radius:
+            m += 1
+        else:
+            last = min(end, m + 1 + int(min(max(radius - clearance - field.cell, 0.0) * stretch, float(end))))
+            for k in range(m, last):
+                row[k] = SOLID
+            m = last
