@@ -18,7 +18,10 @@ from handey_studio.grasping.grasp_plane import GraspPlane, fill_grasp_plane
 from handey_studio.grasping.groups import GraspGroup, grasp_groups
 from handey_studio.grasping.hand_outline import hand_outline, outline_with
 from handey_studio.grasping.placements import Placement, PlacementOptions, stable_placements
+from handey_studio.grasping.plane_outlines import PlaneOutline, plane_outlines
 from handey_studio.grasping.plane_search import SearchOptions, plane_space
+from handey_studio.grasping.ranking import RankTerms, rank_terms
+from handey_studio.grasping.reach import BranchRange, ReachOptions, branch_ranges, within_reach
 from handey_studio.grasping.regrasps import GOAL, START, RegraspSequence, SequenceCosts, Transfer, sequences, why_none
 from handey_studio.grasping.rotations import (
     HAND_MARGIN_M,
@@ -36,6 +39,7 @@ __all__ = [
     "GOAL",
     "HAND_MARGIN_M",
     "START",
+    "BranchRange",
     "BumpIterations",
     "BumpLines",
     "BumpOptions",
@@ -56,6 +60,9 @@ __all__ = [
     "PatchOptions",
     "Placement",
     "PlacementOptions",
+    "PlaneOutline",
+    "RankTerms",
+    "ReachOptions",
     "RegraspSequence",
     "RotationFault",
     "SearchOptions",
@@ -64,6 +71,7 @@ __all__ = [
     "Transfer",
     "Wanted",
     "angle_range",
+    "branch_ranges",
     "bump_lines",
     "contact_area",
     "contact_areas",
@@ -85,10 +93,13 @@ __all__ = [
     "plan_grasp_motion",
     "plan_lowering",
     "plan_retreat",
+    "plane_outlines",
     "plane_space",
+    "rank_terms",
     "sequences",
     "stable_placements",
     "tilt",
     "tilts_at",
     "why_none",
+    "within_reach",
 ]

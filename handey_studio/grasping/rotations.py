@@ -1,6 +1,6 @@
 """Legal rotations of the hand about a grasp point, at pickup and putdown together (Handey 1987 §5.1, Figures 7 and 8)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Literal
 
@@ -12,7 +12,8 @@ from handey_studio.grasping.angle_ranges import Ranges, complement, inside, join
 from handey_studio.grasping.classes import contact_areas, hand_in_plane, opening_around
 from handey_studio.grasping.forbidden_angles import MOST_RANGES
 from handey_studio.grasping.groups import GraspGroup
-from handey_studio.grasping.plane_obstacles import Volumes, add_columns, add_solids, depth_columns, hand_volumes
+from handey_studio.grasping.plane_columns import add_columns, depth_columns
+from handey_studio.grasping.plane_obstacles import Volumes, add_solids, hand_volumes
 from handey_studio.world import Hand, Part, PlacedPart, World
 from handey_studio.world.collision import ALLOWED_DEPTH_M, collision_model
 from handey_studio.world.collision_bodies import Obstacles, obstacles_of
@@ -54,14 +55,15 @@ class GraspEnd(Value):
 class ForbiddenRange:
     """Hand angles `low` to `high` [rad] of a group that are forbidden at one end of the motion or at both, and by what.
 
-    `body` is what the hand would meet, open, closed, or on its way between, or nothing (""): then the fingers would touch too little of the
-    part.
+    `body` is the obstacle that the hand would meet, open, closed, or on its way between; nothing ("") where the fingers would touch too
+    little of the part, and where the arm has no branch within its joint limits (`within_reach`).
     """
 
     low: float
     high: float
     end: End
     body: str
+    what: Literal["obstacle", "contact", "reach"] = "obstacle"
 
 
 @dataclass(frozen=True)
@@ -126,13 +128,16 @@ class LegalRotations(Value):
 
     def fault(self) -> RotationFault | None:
         """Why no angle is left, if none is."""
-        contact = [f for f in self.forbidden if not f.body]
+        contact = [f for f in self.forbidden if f.what == "contact"]
         own = [f for f in self.forbidden if f.end == "both"]
+        met = [f for f in self.forbidden if f.what != "reach"]
         stages: list[tuple[str, End, list[ForbiddenRange]]] = [
             ("the fingers would touch too little of the part at every angle", "both", contact),
             ("the part itself is in the hand's way at every angle", "both", own),
-            *((f"the hand collides at every angle at the {end}", end, own + [f for f in self.forbidden if f.end == end]) for end in ENDS),
-            ("no hand angle is legal at pickup and putdown together", "both", list(self.forbidden)),
+            *((f"the hand collides at every angle at the {end}", end, own + [f for f in met if f.end == end]) for end in ENDS),
+            ("no hand angle is legal at pickup and putdown together", "both", met),
+            *((f"the arm reaches no legal angle at the {end}", end, met + [f for f in self.forbidden if f.end == end]) for end in ENDS),
+            ("the arm reaches no hand angle at pickup and putdown together", "both", list(self.forbidden)),
         ]
         angles, window = np.linspace(self.low, self.high, 61), self.high - self.low
         upright = float(angles[np.argmin(self.tilts(angles).sum(axis=1))])
@@ -170,13 +175,14 @@ def legal_rotations(group: GraspGroup, pickup: GraspEnd, putdown: GraspEnd) -> L
     own = pickup.own or putdown.own
     forbidden = list(_contact_ranges(group, hand))
     forbidden += _own_ranges(group, own.part, hand, own.name) if own else ()
+    planes = [end.T_world_part @ group.grasp_class.T_part_plane for end in (pickup, putdown)]
+    found = LegalRotations(group, *window, tuple(forbidden), np.array([T[2, 1:3] for T in planes]))
+    if not found.legal:
+        return found  # whatever the scene
     volumes = hand_volumes(hand, group.grasp_class.width, opening_around(hand, group.grasp_class.width), HAND_MARGIN_M)
-    uprights = []
-    for name, end in zip(ENDS, (pickup, putdown), strict=True):
-        T_world_plane = end.T_world_part @ group.grasp_class.T_part_plane
-        uprights.append(T_world_plane[2, 1:3])
-        forbidden += [ForbiddenRange(low, high, name, body) for body, low, high in _end_ranges(end, T_world_plane, group, volumes, window)]
-    return LegalRotations(group, *window, tuple(forbidden), np.array(uprights))
+    for name, end, T in zip(ENDS, (pickup, putdown), planes, strict=True):
+        forbidden += [ForbiddenRange(low, high, name, body) for body, low, high in _end_ranges(end, T, group, volumes, window)]
+    return replace(found, forbidden=tuple(forbidden))
 
 
 def _end_ranges(
@@ -218,7 +224,7 @@ def _contact_ranges(group: GraspGroup, hand: Hand) -> tuple[ForbiddenRange, ...]
     enough = areas >= hand.min_contact_area
     short = ~(enough[:-1] & enough[1:])
     spans = joined(list(zip(angles[:-1][short], angles[1:][short], strict=True)))
-    return tuple(ForbiddenRange(float(low), float(high), "both", "") for low, high in spans)
+    return tuple(ForbiddenRange(float(low), float(high), "both", "", "contact") for low, high in spans)
 
 
 def _to_point(group: GraspGroup) -> NDArray:
