@@ -1,4 +1,4 @@
-"""§5: grasp classes and approach groups, legal rotations, and the bump-line approach in the grasp plane."""
+"""§5: grasp classes and approach groups, legal rotations, the ways in and out of the grasp plane, stable grips, regrasping."""
 
 from handey_studio.grasping.bump_lines import BumpLines, BumpOptions, bump_lines, plan_approach
 from handey_studio.grasping.bump_run import BumpIterations, BumpRun

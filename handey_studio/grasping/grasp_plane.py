@@ -23,7 +23,7 @@ from handey_studio.world import Hand, World
 from handey_studio.world.collision_bodies import TABLE_SKIN_M, solids_of
 
 CELL_M = 0.002
-HALF_SIZE_M = 0.24  # the bounding rectangle reaches this far from the grasp point: the hand's whole length and its way in
+WAY_IN_M = 0.12  # the bounding rectangle reaches this much farther from the grasp point than the hand is long
 RAY_SPACING_M = 0.001  # finer maps are made coarser, the highest wins; coarser ones have several rays a column
 SAME_AREA = 1e-14  # [m²] points that span less lie on a line, or are one
 NO_CELLS = np.zeros((0, 0), dtype=bool)
@@ -78,7 +78,7 @@ def fill_grasp_plane(
 ) -> GraspPlane:
     """The grasp plane around `centre` (y, z) [m] with everything the world believes projected into it; `held` is where a part in the hand
     begins and ends along x [m]."""
-    origin, half = np.asarray(centre) - HALF_SIZE_M, opening / 2.0
+    origin, half = np.asarray(centre) - half_size(hand), opening / 2.0
     volumes = [
         [(-half - hand.finger_thickness, -half), (half, half + hand.finger_thickness)],
         [(-hand.crosspiece_length / 2.0, hand.crosspiece_length / 2.0)],
@@ -88,12 +88,18 @@ def fill_grasp_plane(
     bodies = [apply(T_plane_world, corners) for _, corners in solids_of(world)]
     first, corners = np.cumsum([0] + [len(body) for body in bodies]), np.concatenate(bodies)
     points = depth_points(world.terrain, world.table_z, float(world.free_space[1, 2])) if world.terrain is not None else np.empty((0, 3))
-    grids = [np.zeros((round(2 * HALF_SIZE_M / CELL_M),) * 2, dtype=np.bool_) for _ in volumes]
+    grids = [np.zeros((round(2 * half_size(hand) / CELL_M),) * 2, dtype=np.bool_) for _ in volumes]
     for grid, slabs in zip(grids, volumes, strict=True):
         for low, high in slabs:
             _fill_bodies(grid, corners, first, origin, CELL_M, low, high)
             _fill_rays(grid, points.copy(), T_plane_world, world.table_z, origin, CELL_M, low, high)
     return GraspPlane(T_world_plane, origin, CELL_M, *grids)
+
+
+def half_size(hand: Hand) -> float:
+    """How far [m] the bounding rectangle reaches from the grasp point to each side, in whole cells."""
+    length = max(float(hand.T_flange_hand[2, 3]), hand.finger_length + hand.crosspiece_height)
+    return float(np.ceil((length + WAY_IN_M) / CELL_M - 1e-9)) * CELL_M
 
 
 @lru_cache(maxsize=8)

@@ -26,7 +26,7 @@ from handey_studio.grasping import (
     plan_retreat,
     plane_space,
 )
-from handey_studio.grasping.grasp_plane import CELL_M, HALF_SIZE_M
+from handey_studio.grasping.grasp_plane import CELL_M, half_size
 from handey_studio.grasping.hand_outline import overlaps
 from handey_studio.grasping.plane_search import BIN_M, way_out
 from handey_studio.world import Block, Held, Library, PlacedPart, World
@@ -35,6 +35,7 @@ from handey_studio.world.collision import collision_model
 LIBRARY = Library.choose()
 ROBOT = LIBRARY.robot("ur5")
 HAND = ROBOT.hand
+HALF_SIZE_M = half_size(HAND)
 BRICK = LIBRARY.part("brick")
 GROUP = grasp_groups(BRICK, HAND)[0][0]
 ALONG = np.array([np.cos(GROUP.angle), np.sin(GROUP.angle)])
