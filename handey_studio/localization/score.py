@@ -41,9 +41,9 @@ FEATURES = (
 )
 LEAST_EDGE_M = 0.001  # a logarithm is taken of no less
 FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and from which agreement decides
-AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.873  # edges times surfaces that agree: how fast odds grow, and where they are even
+AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.853  # edges times readings that agree: how fast odds grow, and where they are even
 EDGES_WORTH, EVEN_EDGES = 4.0, 6.0  # more edges that are found say more
-OFF_COST, SUNK_COST = 4.0, 1.5  # a sigma that the readings' rms is too large; a slack too far below the table
+OFF_COST, SUNK_COST = 4.0, 2.0  # a sigma that the readings' rms is too large; a slack too far below the table
 TOUCHES = 2.0  # standard deviations of a corner's height, and of a reading, from the table
 
 
@@ -85,6 +85,11 @@ class Rated(NamedTuple):
     def below(self) -> NDArray:
         """How far (n,) [m] they reach below the table; 0 where no table is seen."""
         return np.maximum(-np.nan_to_num(self.footing[:, 0]), 0.0)
+
+    @property
+    def sunk(self) -> NDArray:
+        """How far (n,) [m] the three corners that carry them are below the table in the mean: a tilt sinks some and lifts others."""
+        return np.maximum(-np.nan_to_num(self.footing), 0.0).mean(axis=1)
 
 
 def features(search: Search, part: Part, rated: Rated) -> NDArray:
@@ -160,8 +165,9 @@ def scores(search: Search, part: Part, rated: Rated) -> list[Score]:
 
 def _coarse_odds(search: Search, rated: Rated) -> NDArray:
     """Logarithm (n,) of the odds before a sensor of much noise."""
-    agreement = rated.verdict.edge_share * rated.verdict.surface_share
+    tally = rated.tally
+    agreement = rated.verdict.edge_share * tally.on / np.maximum(tally.on + tally.through, 1e-12)
     off = np.clip(rated.rms / search.view.noise - 1.0, 0.0, 5.0)
-    sunk = np.maximum(rated.below / search.slack - 1.0, 0.0)
+    sunk = np.maximum(rated.sunk / search.slack - 1.0, 0.0)
     many = np.log(np.maximum(rated.verdict.edges, 0.5) / EVEN_EDGES)
     return AGREEMENT_WORTH * (agreement - EVEN_AGREEMENT) + EDGES_WORTH * many - OFF_COST * off - SUNK_COST * sunk
