@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from handey_studio.app.state import Job, State, with_view
 from handey_studio.session import Session
+from handey_studio.session.ledger_tree import ROOT
 from handey_studio.task.plan import MoveResult
 
 CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
@@ -45,7 +46,7 @@ class JobDone:
         if state.job is None or state.job.number != self.number:
             return state
         session = merged(state.session, self.session)
-        state = replace(state, session=session, job=None)
+        state = replace(state, session=session, job=None, ledger_at=ROOT, ledger_page=0, ledger_entry=ROOT)
         state = with_view(state, time_s=0.0, result=-1)
         result = session.result
         if result is None:

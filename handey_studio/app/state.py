@@ -4,9 +4,11 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
+from handey_studio.base import Entry
 from handey_studio.localization import Hypothesis
 from handey_studio.localization.explain import Explanation
 from handey_studio.session import Replay, Session
+from handey_studio.session.ledger_tree import ROOT
 from handey_studio.task.plan import Carry, MoveCommand
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Robot
@@ -16,17 +18,26 @@ MAX_UNDO = 100
 
 @dataclass(frozen=True)
 class Settings:
-    """What the user sets and can take back: the MOVE commands and the seed."""
+    """What the user sets and can take back: the MOVE commands, the seed and the robot."""
 
     commands: tuple[MoveCommand, ...]
     seed: int
+    robot: str
 
     @classmethod
     def of(cls, session: Session) -> "Settings":
-        return cls(session.commands, session.seed)
+        return cls(session.commands, session.seed, session.workcell.robot)
 
     def put_into(self, session: Session) -> Session:
-        return replace(session, commands=self.commands, seed=self.seed)
+        return with_robot(replace(session, commands=self.commands, seed=self.seed), self.robot)
+
+
+def with_robot(session: Session, robot: str) -> Session:
+    """The session with another robot in its workcell: what was planned for the one before goes, what was scanned stays."""
+    if robot == session.workcell.robot:
+        return session
+    view = replace(session.view, time_s=0.0, result=-1)
+    return replace(session, workcell=replace(session.workcell, robot=robot), results=(), view=view)
 
 
 @dataclass(frozen=True)
@@ -71,6 +82,7 @@ class Explained:
 class State:
     """Everything that the screen shows. `saved` is the session as it is on disk at `path`.
 
+    `ledger_at` is the entry whose branches are listed, page by page, `ledger_entry` the one that is looked at; `ROOT` is none.
     `hypothesis_part`, `hypothesis_verdict` and `edge_min_m` narrow down what of the localizer's work is looked at.
     """
 
@@ -91,6 +103,9 @@ class State:
     ledger_stage: str = ""
     ledger_only: str = "all"
     ledger_words: str = ""
+    ledger_at: int = ROOT
+    ledger_page: int = 0
+    ledger_entry: int = ROOT
     hypothesis_part: str = ""
     hypothesis_verdict: str = ""
     edge_min_m: float = 0.0
@@ -126,6 +141,12 @@ class State:
         return said.explanation
 
     @property
+    def entry(self) -> Entry | None:
+        """The entry of the ledger that is looked at."""
+        ledger = self.session.result.ledger if self.session.result else ()
+        return ledger[self.ledger_entry] if 0 <= self.ledger_entry < len(ledger) else None
+
+    @property
     def unsaved(self) -> bool:
         """Whether something worth keeping differs from the file. How one looks at it is not worth a question."""
         return self.saved is None or _kept(self.saved) != _kept(self.session)
@@ -145,7 +166,13 @@ class State:
         before = Settings.of(self.session)
         if before == Settings.of(session):
             return replace(self, session=session)
-        return replace(self, session=session, undo=(*self.undo, Change(label, before))[-MAX_UNDO:], redo=())
+        return replace(self.showing(session), undo=(*self.undo, Change(label, before))[-MAX_UNDO:], redo=())
+
+    def showing(self, session: Session) -> "State":
+        """With another session, and the robot that it names. Raises BadInput when that is unknown."""
+        same = session.workcell.robot == self.session.workcell.robot
+        robot = self.robot if same else self.library.robot(session.workcell.robot)
+        return replace(self, session=session, robot=robot, playing=self.playing and same)
 
 
 def opened(library: Library, session: Session, path: Path | None, before: State | None = None) -> State:
@@ -163,7 +190,7 @@ def undone(state: State) -> State:
         return state
     change = state.undo[-1]
     forward = Change(change.label, Settings.of(state.session))
-    return replace(state, session=change.before.put_into(state.session), undo=state.undo[:-1], redo=(*state.redo, forward))
+    return replace(state.showing(change.before.put_into(state.session)), undo=state.undo[:-1], redo=(*state.redo, forward))
 
 
 def redone(state: State) -> State:
@@ -172,7 +199,7 @@ def redone(state: State) -> State:
         return state
     change = state.redo[-1]
     back = Change(change.label, Settings.of(state.session))
-    return replace(state, session=change.before.put_into(state.session), undo=(*state.undo, back), redo=state.redo[:-1])
+    return replace(state.showing(change.before.put_into(state.session)), undo=(*state.undo, back), redo=state.redo[:-1])
 
 
 def with_view(state: State, **changes) -> State:

@@ -16,6 +16,7 @@ from handey_studio.app.panels.timeline import TimelinePanel
 from handey_studio.app.scene.cspace import CSpaceScene
 from handey_studio.app.scene.depth import DepthScene
 from handey_studio.app.scene.destination import DestinationScene
+from handey_studio.app.scene.failure import FailureScene
 from handey_studio.app.scene.findings import PlanScene
 from handey_studio.app.scene.hypothesis import HypothesisScene
 from handey_studio.app.scene.pair import PairScene
@@ -46,7 +47,7 @@ class View:
         server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
         scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server, send)]
         scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), HypothesisScene(server)]
-        scenes += [PairScene(server), PlanScene(server), CSpaceScene(server), WristBoxScene(server)]
+        scenes += [PairScene(server), PlanScene(server), CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
         session = SessionPanel(server, send)
         self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()

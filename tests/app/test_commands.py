@@ -7,11 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from handey_studio.app.browsing import chosen, ledger_page, listed
 from handey_studio.app.commands import (
     ChoosePart,
+    ChooseRobot,
     DropGhost,
     FilterLedger,
     FreePose,
+    LedgerPage,
+    LedgerRow,
+    LedgerUp,
+    LookAtNoEntry,
     PointAt,
     Redo,
     ResetCell,
@@ -23,12 +29,12 @@ from handey_studio.app.commands import (
 )
 from handey_studio.app.guidance import next_step
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows, JobStarted
-from handey_studio.app.panels.ledger import chosen
 from handey_studio.app.playback import Seek, SeekStep, SetPlayback, Tick, TogglePlay
 from handey_studio.app.state import MAX_UNDO, Settings, opened
-from handey_studio.base import BadInput
+from handey_studio.base import BadInput, Ledger
 from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy
 from handey_studio.session.destination import destination_pose, snapped
+from handey_studio.session.ledger_tree import ROOT
 from tests.session.samples import fresh_session, full_session, library
 
 
@@ -213,3 +219,44 @@ def test_every_state_says_what_to_do_next(fresh, full):
     titles = [next_step(s)[0] for s in (fresh, full, bare, no_plan, JobStarted(True).apply(full), SetDestination("0,0,0").apply(full))]
     assert len(set(titles)) == len(titles)
     assert "no grasp." in next_step(no_plan)[1]
+
+
+def tree_of(full):
+    """A state whose ledger has two destinations, one with twenty groups, the last of which has an approach below it."""
+    book = Ledger()
+    here, there = book.add("destination", "here"), book.add("destination", "there", "outside")
+    groups = [book.add("grasp group", f"edge {k}", "too narrow" if k % 2 else None, parent=here) for k in range(20)]
+    book.add("approach", "hand at 5°", "stuck", parent=groups[-1], value=0.01, limit=0.002, unit="m")
+    result = replace(full.session.results[0], ledger=book.entries)
+    view = replace(full.session.view, result=-1)
+    return replace(full, session=replace(full.session, results=(result,), view=view)), here, there, groups
+
+
+def test_the_ledger_is_a_tree_that_opens_row_by_row(full):
+    state, here, there, groups = tree_of(full)
+    assert [entry.id for entry in listed(state)] == [here, there]
+    state = LedgerRow(1).apply(state)
+    assert state.entry.id == there and state.ledger_at == ROOT, "nothing is below it"
+    state = LedgerRow(0).apply(state)
+    assert state.entry.id == here and len(listed(state)) == 20 and len(ledger_page(state)) < 20
+    for _ in range(9):
+        state = LedgerPage(1).apply(state)
+    assert ledger_page(state)[-1].id == groups[-1]
+    state = LedgerRow(len(ledger_page(state)) - 1).apply(state)
+    assert state.ledger_at == groups[-1] and [entry.option for entry in listed(state)] == ["hand at 5°"]
+    state = after(state, LedgerRow(0), LedgerRow(7))
+    assert state.entry.reason == "stuck" and LookAtNoEntry().apply(state).entry is None
+    assert after(state, LedgerUp()).ledger_at == here and after(state, LedgerUp(), LedgerUp(), LedgerUp()).entry is None
+
+
+def test_another_robot_takes_its_plans_away_and_comes_back_by_undo(full):
+    state = ChooseRobot("ur10").apply(full)
+    assert (
+        state.robot.name == state.session.workcell.robot == "ur10"
+        and not state.session.results
+        and state.session.scene is full.session.scene
+    )
+    back = Undo().apply(state)
+    assert back.robot == full.robot and back.session.workcell.robot == "ur5"
+    with pytest.raises(BadInput, match="robot"):
+        ChooseRobot("r2d2").apply(full)

@@ -10,16 +10,18 @@ from handey_studio.app import html
 from handey_studio.app.cspace import nearest, slice_svg
 from handey_studio.app.palette import elevation_colours
 from handey_studio.app.panels.findings import grasp_facts, result_html
-from handey_studio.app.panels.ledger import context, ledger_html
+from handey_studio.app.panels.ledger import context, entry_html, ledger_html
 from handey_studio.app.panels.sensing import counted, found_html, picked, word_of
 from handey_studio.app.panels.timeline import strip
 from handey_studio.app.scene.depth import elevation_span, stride_of, thinned
+from handey_studio.app.state import State
 from handey_studio.app.svg import grasp_plane_svg
 from handey_studio.base import Ledger
 from handey_studio.motion import CSpaceSummary
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session import Replay
 from handey_studio.session.looking import unexplained
+from handey_studio.world import Library
 from tests.session.samples import T_START, full_session, hand_made_scan, library
 
 
@@ -68,7 +70,13 @@ def test_words_of_others_are_escaped_everywhere(session):
     result = replace(session.results[0], reason=evil, status="failed", plan=None, timing_s={evil: 1.0})
     scene = replace(session.scene, instances=tuple(replace(placed, name=evil) for placed in session.located))
     located = replace(scene.located, reason=evil)
-    shown = [ledger_html(entries, entries), result_html(result), found_html(replace(session, scene=replace(scene, located=located)))]
+    state = told(session, entries)
+    shown = [
+        ledger_html(state, ["b"]),
+        entry_html(entries[0], entries),
+        result_html(result),
+        found_html(replace(session, scene=replace(scene, located=located))),
+    ]
     shown += [html.card(evil, evil, testid=evil), html.facts([(evil, evil)]), html.empty(evil), html.swatch((0, 0, 0), evil)]
     assert all("<script" not in text for text in shown)
 
@@ -79,18 +87,29 @@ def test_the_timeline_strip_names_the_step_at_its_time(session, robot):
     assert "left:50.000%" in strip(replay, 5.0, True, 1.0)
 
 
-def test_the_ledger_groups_by_stage_and_says_what_an_entry_belongs_to():
+def told(session, entries):
+    """A state that looks at a result with this ledger."""
+    result = replace(session.results[0], ledger=entries)
+    session = replace(session, results=(result,), view=replace(session.view, result=-1))
+    here = Library.choose()
+    return State(here, session, here.robot("ur5"))
+
+
+def test_the_ledger_is_a_tree_of_rows_and_says_what_an_entry_belongs_to(session):
     book = Ledger()
     goal = book.add("destination", "here")
     first, second = book.add("grasp group", "edge 1", "too narrow", parent=goal), book.add("grasp group", "edge 2", parent=goal)
     hand = book.add("approach", "hand at 5°", parent=second)
     book.add("reach", "branch 3", "the arm collides", parent=hand, value=-0.013, limit=0.001, unit="m", bodies=("a", "b"))
     known = {entry.id: entry for entry in book.entries}
-    assert context(book.entries[4], known) == "edge 2 › hand at 5°"
-    assert context(book.entries[first], known) == "" == context(book.entries[goal], known)
-    text = ledger_html(book.entries, book.entries)
-    assert "2 tried, 1 fell" in text and "the arm collides (a and b): -13 mm, limit 1 mm" in text
-    assert text.index("Destination") < text.index("Grasp group") < text.index("Approach") < text.index("Reach")
+    assert context(book.entries[4], known) == "here › edge 2 › hand at 5°"
+    assert context(book.entries[first], known) == "here" and context(book.entries[goal], known) == ""
+    state = told(session, book.entries)
+    text = ledger_html(state, ["b"] * 9)
+    assert "here" in text and "4 ▸" in text and "2 of 4 below it fell" in text and 'data-testid="entry-1"' not in text
+    text = ledger_html(replace(state, ledger_at=hand, ledger_entry=4), ["b"] * 9)
+    assert "here › edge 2 › hand at 5°" in text and "the arm collides (a and b): -13 mm, limit 1 mm" in text
+    assert "-13 mm" in entry_html(book.entries[4], book.entries)
 
 
 def test_labels_lead_back_to_their_words():

@@ -1,4 +1,4 @@
-"""The ledger as a list: what was tried, and why each candidate fell."""
+"""The ledger: a tree of everything that was tried, with the reason of each branch that fell; a click shows the failure in the scene."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,109 +6,116 @@ from typing import Any
 import viser
 
 from handey_studio.app import html, palette
-from handey_studio.app.commands import FilterLedger
+from handey_studio.app.browsing import LEDGER_ROWS, filtered, ledger_of, ledger_page, listed
+from handey_studio.app.commands import FilterLedger, LedgerPage, LedgerRow, LedgerUp, LookAtNoEntry
 from handey_studio.app.palette import css
 from handey_studio.app.state import State
-from handey_studio.app.wire import Send, on_user, set_to
+from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.base import Entry, describe, rejected_counts
+from handey_studio.session.ledger_tree import path_to, sizes_below
 
 ALL_STAGES = "all stages"
 ONLY = ("all", "fell", "stood")
-MAX_ROWS, MAX_REASONS, MAX_DEPTH = 80, 8, 12
+MAX_REASONS, MAX_DEPTH = 6, 12
+UP, BACK, ON, AWAY = "▲ Up", "◀ Prev", "Next ▶", "Clear"
+PRESSED = {UP: LedgerUp(), BACK: LedgerPage(-1), ON: LedgerPage(1), AWAY: LookAtNoEntry()}
+NOTHING = "Nothing was tried yet. After Plan or MOVE this is the tree of every option, and why each branch fell."
 
 
 class LedgerPanel:
-    """Counts of reasons first, then the entries by stage."""
+    """Counts of reasons, the branches with their buttons, and the entry that is looked at."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._stage: Any = gui.add_dropdown("Stage", (ALL_STAGES,))
         self._only = gui.add_dropdown("Entries", ONLY)
         self._words = gui.add_text("Find", "")
         self._list = gui.add_html("")
+        self._rows = [gui.add_button(f"Entry in row {row + 1}") for row in range(LEDGER_ROWS)]  # pressed by the list, which hides them
+        self._browse = gui.add_button_group("Branches", (UP, BACK, ON, AWAY), hint="A row with ▸ opens what was tried below it")
+        self._about = gui.add_html("")
         on_user(self._stage, send, lambda event: FilterLedger(stage="" if event.target.value == ALL_STAGES else event.target.value))
         on_user(self._only, send, lambda event: FilterLedger(only=event.target.value))
         on_user(self._words, send, lambda event: FilterLedger(words=event.target.value))
+        on_click(self._browse, send, lambda event: PRESSED[event.target.value])
+        for row, button in enumerate(self._rows):
+            on_click(button, send, lambda _, row=row: LedgerRow(row))
 
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
             return
-        result = new.session.result
-        entries = result.ledger if result else ()
+        entries = ledger_of(new)
         stages = (ALL_STAGES, *dict.fromkeys(entry.stage for entry in entries))
         if tuple(self._stage.options) != stages:
             self._stage.options = stages
         set_to(self._stage, value=new.ledger_stage if new.ledger_stage in stages else ALL_STAGES)
-        picked = chosen(entries, new.ledger_stage if new.ledger_stage in stages else "", new.ledger_only, new.ledger_words)
-        self._list.content = ledger_html(picked, entries) if entries else html.empty(NOTHING, "ledger-empty")
+        buttons = [element_id(button) for button in self._rows]
+        set_to(self._browse, visible=bool(entries))
+        self._list.content = ledger_html(new, buttons) if entries else html.hidden(buttons) + html.empty(NOTHING, "ledger-empty")
+        self._about.content = entry_html(new.entry, entries) if new.entry is not None else ""
 
 
-NOTHING = "Nothing was tried yet. After Plan or MOVE this lists every candidate and why it fell."
-
-
-def chosen(entries: Sequence[Entry], stage: str, only: str, words: str) -> list[Entry]:
-    """The entries that pass the filter; every word must occur somewhere in an entry."""
-    wanted = words.lower().split()
-    return [
-        entry
-        for entry in entries
-        if (not stage or entry.stage == stage)
-        and (only == "all" or (only == "fell") == (entry.reason is not None))
-        and all(word in _text(entry) for word in wanted)
-    ]
-
-
-def ledger_html(entries: Sequence[Entry], whole: Sequence[Entry]) -> str:
-    """Reasons by count, then rows grouped by stage. `whole` is the unfiltered ledger, which knows the entries' parents."""
-    counts = list(rejected_counts(entries).items())
+def ledger_html(state: State, buttons: Sequence[str]) -> str:
+    """Reasons by count, the way down to the branches that are listed, then a row each; a click presses the button of its place."""
+    entries, page, every = ledger_of(state), ledger_page(state), listed(state)
+    counts = list(rejected_counts(every if filtered(state) else entries).items())
     most = max((count for _, count in counts), default=1)
     bars = "".join(html.count_row(reason, count, most, palette.VERMILLION) for reason, count in counts[:MAX_REASONS])
-    head = f'<div style="color:#6b7684;margin:6px 0">{len(entries)} of {len(whole)} entries.</div>'
+    below = sizes_below(entries)
+    rows = "".join(_row(entry, below[entry.id], entry.id == state.ledger_entry, b) for entry, b in zip(page, buttons, strict=False))
+    first = state.ledger_page * LEDGER_ROWS
+    head = f"{first + 1} to {first + len(page)} of {len(every)}" if page else "none"
+    where = f"{len(every)} of {len(entries)} entries match; {head}" if filtered(state) else f"{_trail(state)}: {head}"
     return (
-        f'<div data-testid="ledger" style="margin:4px 14px;font-size:12px;line-height:1.4">{bars}{head}'
-        f'<div style="max-height:420px;overflow:auto">{_groups(entries, {entry.id: entry for entry in whole})}</div></div>'
+        f'{html.hidden(buttons)}<div data-testid="ledger" style="margin:4px 14px;font-size:12px;line-height:1.4">{bars}'
+        f'<div style="color:#6b7684;margin:8px 0 3px">{where}</div>{rows}</div>'
     )
 
 
-def _groups(entries: Sequence[Entry], known: dict[int, Entry]) -> str:
-    """One heading a stage, in the order in which stages first ran, with its entries below."""
-    stages: dict[str, list[Entry]] = {}
-    for entry in entries:
-        stages.setdefault(entry.stage, []).append(entry)
-    groups = []
-    for stage, members in stages.items():
-        fell = sum(entry.reason is not None for entry in members)
-        name = stage[:1].upper() + stage[1:]
-        heading = f'{html.esc(name)} <span style="font-weight:400;color:#6b7684">{len(members)} tried, {fell} fell</span>'
-        more = len(members) - MAX_ROWS
-        rest = f'<div style="color:#6b7684">and {more} more; narrow it down above</div>' if more > 0 else ""
-        rows = "".join(_row(entry, known) for entry in members[:MAX_ROWS])
-        groups.append(f'<div style="font-weight:650;margin:8px 0 2px">{heading}</div>{rows}{rest}')
-    return "".join(groups)
+def _trail(state: State) -> str:
+    """The options down to the one whose branches are listed."""
+    path = path_to(ledger_of(state), state.ledger_at)
+    return " › ".join(html.esc(entry.option) for entry in path) or f"{len(ledger_of(state))} entries in all; at the top"
 
 
-def _row(entry: Entry, known: dict[int, Entry]) -> str:
-    """A mark that says whether it fell, the option and what it belongs to, and below it the reason with value and limit."""
+def _row(entry: Entry, below: tuple[int, int], looked_at: bool, button: str) -> str:
+    """A mark that says whether it fell, the option, how much was tried below it, and the reason with value and limit."""
     fell = entry.reason is not None
     colour, sign = (palette.VERMILLION, "✕") if fell else (palette.TEAL, "●")
-    mark = f'<span style="color:{css(colour)};display:inline-block;width:18px">{sign}</span>'
-    owner = html.esc(context(entry, known))
-    below = [f'<div style="color:#97a1ad;padding-left:18px">{owner}</div>'] if owner else []
-    below += [f'<div style="color:#6b7684;padding-left:18px">{html.esc(describe(entry))}</div>'] if fell else []
-    return f'<div style="padding:2px 0;border-bottom:1px solid #eef1f4">{mark}{html.esc(entry.option)}{"".join(below)}</div>'
+    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if looked_at else "border-left-color:#e3e8ee"
+    clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
+    more = f'<span style="color:#6b7684;white-space:nowrap">{below[0]} ▸</span>' if below[0] else ""
+    said = html.esc(describe(entry) or (f"{below[1]} of {below[0]} below it fell" if below[0] else "nothing speaks against it"))
+    return (
+        f'<div data-testid="entry-{entry.id}" role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}" title="{said}" '
+        f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
+        f'<div style="display:flex;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span>'
+        f'<span style="flex:1;{clipped}"><span style="color:#8a94a0">{html.esc(entry.stage)}</span> {html.esc(entry.option)}</span>'
+        f'{more}</div><div style="color:#6b7684;padding-left:18px;font-size:11.5px;{clipped}">{said}</div></div>'
+    )
+
+
+def entry_html(entry: Entry, entries: Sequence[Entry]) -> str:
+    """The entry that is looked at: what it belongs to, the reason with its number, and what the scene shows of it."""
+    title = f"{entry.stage[:1].upper()}{entry.stage[1:]}: {entry.option}"
+    said = describe(entry) or "Nothing speaks against it."
+    card = html.card(title, said, "bad" if entry.reason else "good", "entry")
+    rows = [("Belongs to", context(entry, {other.id: other for other in entries}) or "the MOVE itself")]
+    if entry.reason and entry.posture is not None:
+        rows.append(("In the scene", "the arm or hand as it stood then, what it met in red"))
+    elif entry.reason and entry.bodies:
+        rows.append(("In the scene", f"{' and '.join(entry.bodies)} in red"))
+    return card + html.facts(rows, "entry-facts")
 
 
 def context(entry: Entry, known: dict[int, Entry]) -> str:
-    """What an entry belongs to: the options above it, outermost first, without the outermost of all, which is always the same."""
+    """What an entry belongs to: the options above it, outermost first."""
     names: list[str] = []
     while entry.parent is not None and entry.parent in known and len(names) < MAX_DEPTH:
         entry = known[entry.parent]
         names.append(entry.option)
-    return " › ".join(names[-2::-1])
-
-
-def _text(entry: Entry) -> str:
-    return f"{entry.stage} {entry.option} {entry.reason or ''} {' '.join(entry.bodies)}".lower()
+    return " › ".join(reversed(names))
 
 
 def _looks(state: State) -> tuple:
-    return state.session.result, state.ledger_stage, state.ledger_only, state.ledger_words
+    filters = state.ledger_stage, state.ledger_only, state.ledger_words
+    return state.session.result, filters, state.ledger_at, state.ledger_page, state.ledger_entry

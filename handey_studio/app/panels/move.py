@@ -7,7 +7,7 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove, StartMove
-from handey_studio.app.commands import POSE_LABEL, ChoosePart, FreePose, Redo, ResetCell, SetDestination, SetSeed, Undo
+from handey_studio.app.commands import POSE_LABEL, ChoosePart, ChooseRobot, FreePose, Redo, ResetCell, SetDestination, SetSeed, Undo
 from handey_studio.app.guidance import next_step, stages
 from handey_studio.app.scene.destination import ghost_pose
 from handey_studio.app.state import State
@@ -42,6 +42,7 @@ class MovePanel:
         self._redo = gui.add_button("Redo", icon=viser.Icon.ARROW_FORWARD_UP, disabled=True)
         with gui.add_folder("Options", expand_by_default=False):
             self._seed = gui.add_number("Seed", 0, min=0, max=2**31 - 1, step=1, hint="The same seed gives the same plan")
+            self._robot = gui.add_dropdown("Robot", (NO_PART,), hint="The arm in the workcell; what was planned for another goes")
             self._reset = gui.add_button("Reset the cell", icon=viser.Icon.REFRESH, color="gray", hint="As it was before the first MOVE")
         gui.add_html(KEYS)
         self._wire(send)
@@ -51,6 +52,7 @@ class MovePanel:
         on_user(self._to, send, lambda event: FreePose() if event.target.value == POSE_LABEL else SetDestination(event.target.value))
         on_user(self._xyz, send, lambda _: self._typed())
         on_user(self._rpy, send, lambda _: self._typed())
+        on_user(self._robot, send, lambda event: ChooseRobot(event.target.value))
         on_user(self._seed, send, lambda event: SetSeed(int(event.target.value)))
         on_click(self._plan, send, lambda _: StartMove(execute=False))
         on_click(self._move, send, lambda _: StartMove(execute=True))
@@ -92,6 +94,8 @@ class MovePanel:
             set_to(self._rpy, value=rounded(np.rad2deg(rpy), 2))
         set_to(self._why, content=_about_destination(free, pose is not None), visible=not free)
         set_to(self._seed, value=session.seed, disabled=busy)
+        robots = tuple(sorted({*state.library.robot_folders(), session.workcell.robot}))
+        choose(self._robot, robots, session.workcell.robot, busy)
 
     def _show_job(self, state: State) -> None:
         job = state.job
@@ -134,7 +138,7 @@ def _looks(state: State) -> tuple:
         session.commands,
         session.seed,
         session.located,
-        session.workcell.parts,
+        session.workcell,
         session.result,
         state.job,
         state.undo,
