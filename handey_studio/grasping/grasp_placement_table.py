@@ -18,6 +18,7 @@ from handey_studio.grasping.placements import Placement, PlacementOptions, stabl
 from handey_studio.grasping.rotations import HAND_MARGIN_M, GraspEnd, tilt
 from handey_studio.world import Hand, Part
 from handey_studio.world.collision import collision_model
+from handey_studio.world.collision_queries import least_clearance
 from handey_studio.world.gjk import distance
 
 
@@ -125,10 +126,12 @@ def grasp_placement_table(part: Part, hand: Hand, options: TableOptions = TableO
 def legal_at(table: GraspPlacementTable, end: GraspEnd, margin: float = HAND_MARGIN_M) -> NDArray:
     """Which columns (c,) of the table are legal grasps at one end of a MOVE: the open hand keeps `margin` [m] from everything there."""
     model = collision_model(end.world)
-    legal = np.zeros(len(table.angles), dtype=bool)
+    bodies, scene, T_hand_last = model.bodies(None, hand_only=True), model.scene(None, ()), inverse(model.arm.T_last_hand)
+    legal, poses = np.zeros(len(table.angles), dtype=bool), np.zeros((model.arm.n + 1, 4, 4))
     for c in np.nonzero(table.sound)[0]:
-        T_world_hand = end.T_world_part @ table.Ts_part_hand[c]
-        legal[c] = model.hand_contact(T_world_hand, float(table.openings[c]), limit=margin).distance >= margin
+        poses[-1] = end.T_world_part @ table.Ts_part_hand[c] @ T_hand_last
+        corners = bodies.place(poses, float(table.openings[c])).corners
+        legal[c] = least_clearance(bodies.shapes, corners, scene, margin)[0] >= margin  # how deep it collides does not matter here
     return legal
 
 
