@@ -100,7 +100,7 @@ def insert(first: float, last: float, window: tuple[float, float], ranges: NDArr
             else:
                 k += 1
         if counts[body] == MOST_RANGES:
-            _join_nearest(ranges[body], counts, body)
+            join_nearest(ranges[body], counts, body)
         ranges[body, counts[body], 0], ranges[body, counts[body], 1] = low, high
         counts[body] += 1
         turn += WHOLE_TURN
@@ -117,7 +117,7 @@ def _next_start(angle: float, ranges: NDArray, count: int) -> int:
 
 
 @njit(cache=True)
-def _join_nearest(ranges: NDArray, counts: NDArray, body: int) -> None:
+def join_nearest(ranges: NDArray, counts: NDArray, body: int) -> None:
     """Makes one of the two ranges with the least free room between them: more is forbidden, never less."""
     one, other, least = -1, -1, np.inf
     for k in range(counts[body]):

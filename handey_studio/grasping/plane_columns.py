@@ -11,13 +11,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.geometry import HeightField
-from handey_studio.grasping.forbidden_angles import insert, stretch_ranges
+from handey_studio.grasping.forbidden_angles import insert, join_nearest, stretch_ranges
 from handey_studio.grasping.plane_obstacles import Volumes
 from handey_studio.world.collision_bodies import COLUMN_M, TABLE_SKIN_M
 from handey_studio.world.vectors import Vector, dot, plus, times
 
 BIN_M = 0.0005  # columns of the depth map are gathered in strips this wide, across the direction in which they go down
-STEP_M = 0.001  # and along the strips in steps this long
+MOST_RUNS = 8  # of one strip; with more, the nearest two become one
 
 
 class Columns(NamedTuple):
@@ -46,37 +46,33 @@ def add_columns(
 
     `T_world_plane` (4, 4) has its origin at the grasp point.
     """
+    found, half = np.empty((6, 2)), BIN_M / 2.0
     for v in range(len(volumes.slabs)):
-        filled, across, up = filled_strips(columns, T_world_plane, volumes.slabs[v], volumes.boxes[v])
-        half = BIN_M / 2.0
+        runs, counts_of, across, up = filled_strips(columns, T_world_plane, volumes.slabs[v], volumes.boxes[v])
         box = (volumes.boxes[v, 0] + half, volumes.boxes[v, 1] - half, volumes.boxes[v, 2] + half)
-        reach = -0.5 * BIN_M * len(filled)
-        found = np.empty((6, 2))
-        for i in range(len(filled)):
-            h, depth, start = reach + (i + 0.5) * BIN_M, 0, -1
-            for k in range(filled.shape[1]):
-                before = depth
-                depth += filled[i, k]
-                if before == 0 and depth > 0:
-                    start = k
-                if before > 0 and depth == 0:
-                    a, b = reach + start * STEP_M - half, reach + k * STEP_M + half
-                    y, z = h * across[0], h * across[1]
-                    n = stretch_ranges(y + a * up[0], z + a * up[1], y + b * up[0], z + b * up[1], box, found)
-                    for f in range(n):
-                        insert(found[f, 0], found[f, 1], window, ranges, counts, body)
+        for i in range(len(runs)):
+            h = (i + 0.5 - 0.5 * len(runs)) * BIN_M
+            y, z = h * across[0], h * across[1]
+            for k in range(counts_of[i]):
+                a, b = runs[i, k, 0], runs[i, k, 1]
+                n = stretch_ranges(y + a * up[0], z + a * up[1], y + b * up[0], z + b * up[1], box, found)
+                for f in range(n):
+                    insert(found[f, 0], found[f, 1], window, ranges, counts, body)
+
+
+Strips = tuple[NDArray, NDArray, tuple[float, float], tuple[float, float]]
 
 
 @njit(cache=True)
-def filled_strips(columns: Columns, T: NDArray, slab: NDArray, box: NDArray) -> tuple[NDArray, tuple[float, float], tuple[float, float]]:
-    """How the number of columns over a step changes along each strip (strips, steps + 1) of the square around the point; the directions, in
-    y and z, across the strips and up along them."""
+def filled_strips(columns: Columns, T: NDArray, slab: NDArray, box: NDArray) -> Strips:
+    """What the columns fill of each strip of the square around the point: runs (strips, MOST_RUNS, 2) [m] from where to where along it, how
+    many there are (strips,), and the directions, in y and z, across the strips and up along them."""
     steep = np.sqrt(T[2, 1] ** 2 + T[2, 2] ** 2)
     up = (T[2, 1] / steep, T[2, 2] / steep) if steep > 1e-9 else (0.0, 1.0)
     across = (up[1], -up[0])
     strips = 2 * int(np.ceil((np.sqrt(box[0] ** 2 + box[2] ** 2) + BIN_M) / BIN_M))
     reach = 0.5 * BIN_M * strips
-    filled = np.zeros((strips, int(np.ceil(2.0 * reach / STEP_M)) + 2), np.int32)
+    runs, counts = np.empty((strips, MOST_RUNS, 2)), np.zeros(strips, np.int64)
     closing, y, z = _axis(T, 0), _axis(T, 1), _axis(T, 2)
     side, rise = plus(times(across[0], y), times(across[1], z)), plus(times(up[0], y), times(up[1], z))
     feet = _footprint(columns, closing), _footprint(columns, side), _footprint(columns, rise)
@@ -93,14 +89,32 @@ def filled_strips(columns: Columns, T: NDArray, slab: NDArray, box: NDArray) -> 
             offset = (dx, dy, top)
             x, h, s = dot(offset, closing), dot(offset, side), dot(offset, rise)
             first, last = _in_slab(x, closing[2], slab[0] - feet[0], slab[1] + feet[0], columns.tops[j, i] - columns.bottom)
-            high, low = min(s - steep * first + feet[2], reach - STEP_M), max(s - steep * last - feet[2], -reach)
+            high, low = min(s - steep * first + feet[2], reach), max(s - steep * last - feet[2], -reach)
             if first > last or low > high or h - feet[1] >= reach or h + feet[1] <= -reach:
                 continue
-            begin, end = int((low + reach) / STEP_M), int((high + reach) / STEP_M) + 1
             for k in range(max(0, int((h - feet[1] + reach) / BIN_M)), min(strips, int((h + feet[1] + reach) / BIN_M) + 1)):
-                filled[k, begin] += 1
-                filled[k, end] -= 1
-    return filled, across, up
+                _fill(runs, counts, k, low, high)
+    return runs, counts, across, up
+
+
+@njit(cache=True)
+def _fill(runs: NDArray, counts: NDArray, k: int, low: float, high: float) -> None:
+    """Adds a run to those of strip k, made one with those that it touches."""
+    j = 0
+    while j < counts[k]:
+        if runs[k, j, 0] <= low and high <= runs[k, j, 1]:
+            return
+        if runs[k, j, 0] <= high and low <= runs[k, j, 1]:
+            low, high = min(low, runs[k, j, 0]), max(high, runs[k, j, 1])
+            counts[k] -= 1
+            runs[k, j, 0], runs[k, j, 1] = runs[k, counts[k], 0], runs[k, counts[k], 1]
+            j = 0
+        else:
+            j += 1
+    if counts[k] == MOST_RUNS:
+        join_nearest(runs[k], counts, k)
+    runs[k, counts[k], 0], runs[k, counts[k], 1] = low, high
+    counts[k] += 1
 
 
 @njit(cache=True)

@@ -14,6 +14,8 @@ from handey_studio.grasping.forbidden_angles import polygon_ranges
 from handey_studio.world import FINGERS, Hand
 from handey_studio.world.collision_bodies import Obstacles
 
+CLOSING_MARGIN_M = 1e-4  # fingers that close on a part keep this from all else: what stands beside the part is that near
+
 
 class Volumes(NamedTuple):
     """The hand's boxes as they turn in the plane: `slabs` (v, 2) [m] from where to where along the closing direction, `boxes` (v, 3) [m]
@@ -26,16 +28,22 @@ class Volumes(NamedTuple):
 def hand_volumes(hand: Hand, width: float, opening: float, margin: float, skin: float = 0.0) -> Volumes:
     """The volumes of a hand that closes from `opening` to `width` [m], larger by `margin` [m] all around.
 
-    Where the fingers close on the part they end `skin` [m] before its surface, so that they may touch it.
+    What its fingers sweep while they close comes last, larger by CLOSING_MARGIN_M; it ends `skin` [m] before the part's surface, so that
+    they may touch it.
     """
     slabs, boxes = [], []
+    for lower, upper in hand.boxes(opening).values():
+        slabs.append((lower[0] - margin, upper[0] + margin))
+        boxes.append(_rectangle(lower, upper, margin))
     for name, (lower, upper) in hand.boxes(opening).items():
-        low, high = lower[0] - margin, upper[0] + margin
         if name in FINGERS:
-            low, high = (low, -width / 2.0 - skin) if upper[0] <= 0 else (width / 2.0 + skin, high)
-        slabs.append((low, high))
-        boxes.append((max(-lower[1], upper[1]) + margin, -upper[2] - margin, -lower[2] + margin))
+            slabs.append((lower[0], -width / 2.0 - skin) if upper[0] <= 0 else (width / 2.0 + skin, upper[0]))
+            boxes.append(_rectangle(lower, upper, CLOSING_MARGIN_M))
     return Volumes(np.array(slabs), np.array(boxes))
+
+
+def _rectangle(lower: NDArray, upper: NDArray, margin: float) -> tuple[float, float, float]:
+    return max(-lower[1], upper[1]) + margin, -upper[2] - margin, -lower[2] + margin
 
 
 @njit(cache=True)

@@ -11,7 +11,7 @@ from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.grasping.classes import opening_around
 from handey_studio.grasping.groups import GraspGroup
-from handey_studio.grasping.plane_columns import BIN_M, STEP_M, depth_columns, filled_strips
+from handey_studio.grasping.plane_columns import BIN_M, Strips, depth_columns, filled_strips
 from handey_studio.grasping.plane_obstacles import Volumes, clipped, hand_volumes, hull
 from handey_studio.grasping.rotations import ENDS, HAND_MARGIN_M, End, GraspEnd
 from handey_studio.world.collision_bodies import DEPTH_MAP, solids_of
@@ -54,18 +54,17 @@ def _outlines(end: GraspEnd, group: GraspGroup, volumes: Volumes, v: int) -> lis
             shapes.append((name, shapely.Polygon(points)))
     if end.world.terrain is not None:
         columns = depth_columns(end.world.terrain, end.world.table_z, float(end.world.free_space[1, 2]))
-        shapes.append((DEPTH_MAP, _strips(*filled_strips(columns, T_world_plane, volumes.slabs[v], volumes.boxes[v]))))
+        shapes.append((DEPTH_MAP, _filled(filled_strips(columns, T_world_plane, volumes.slabs[v], volumes.boxes[v]))))
     return [(name, corners) for name, shape in shapes for corners in _corners(shape.intersection(reach))]
 
 
-def _strips(filled: NDArray, across: tuple[float, float], up: tuple[float, float]) -> BaseGeometry:
-    """What the depth map's columns fill, from how their number changes along the strips."""
-    counts, reach = np.cumsum(filled, axis=1) > 0, 0.5 * BIN_M * len(filled)
-    changes = np.diff(np.pad(counts, ((0, 0), (1, 1))).astype(int), axis=1)
-    (rows, starts), (_, stops) = np.nonzero(changes > 0), np.nonzero(changes < 0)
-    boxes = shapely.box(rows * BIN_M - reach, starts * STEP_M - reach, (rows + 1) * BIN_M - reach, stops * STEP_M - reach)
-    axes = np.array([across, up])
-    return shapely.transform(shapely.union_all(boxes), lambda points: points @ axes)
+def _filled(strips: Strips) -> BaseGeometry:
+    """What the depth map's columns fill."""
+    runs, counts, across, up = strips
+    rows, cols = np.nonzero(np.arange(runs.shape[1]) < counts[:, None])
+    left = (rows - 0.5 * len(runs)) * BIN_M
+    boxes = shapely.box(left, runs[rows, cols, 0], left + BIN_M, runs[rows, cols, 1])
+    return shapely.transform(shapely.union_all(boxes), lambda points: points @ np.array([across, up]))
 
 
 def _corners(shape: BaseGeometry) -> list[NDArray]:
