@@ -42,9 +42,9 @@ class Mover:
         """Whether one configuration keeps the margin."""
         return self.model.in_contact(q, self.opening, self.held, self.allowed, self.margin) is None
 
-    def moves(self, q_start: NDArray, q_end: NDArray) -> bool:
-        """Whether the straight motion between two configurations is proved to keep the margin."""
-        return self.verdict(q_start, q_end).outcome == PROVED
+    def moves(self, q_start: NDArray, q_end: NDArray, slack: NDArray | float = 0.0) -> bool:
+        """Whether the straight motion between two configurations, and what is within `slack` [rad] of it, is proved to keep the margin."""
+        return self.verdict(q_start, q_end, slack=slack).outcome == PROVED
 
     def obstacle(self, q_start: NDArray, q_end: NDArray) -> tuple[str, ...]:
         """The two bodies that keep the straight motion between two configurations from being proved; none when it is."""
@@ -52,10 +52,18 @@ class Mover:
         hit = Hit(*verdict.hit)
         return () if verdict.outcome == PROVED or hit.kind < 0 else self.model.pair(hit, self.bodies)
 
-    def verdict(self, q_start: NDArray, q_end: NDArray, openings: tuple[float, float] | None = None, nearest: float = 0.0) -> Verdict:
+    def verdict(
+        self,
+        q_start: NDArray,
+        q_end: NDArray,
+        openings: tuple[float, float] | None = None,
+        nearest: float = 0.0,
+        slack: NDArray | float = 0.0,
+    ) -> Verdict:
         start, end = openings or (self.opening, self.opening)
         # Copies: a read-only array is another type to the compiler, and would compile everything anew.
-        motion = Motion(np.array(q_start, dtype=float), np.array(q_end, dtype=float), float(start), float(end))
+        ends = np.array(q_start, dtype=float), np.array(q_end, dtype=float)
+        motion = Motion(*ends, float(start), float(end), np.zeros(len(ends[0])) + slack)
         return Verdict(*prove(self.model.chain, self.bodies.shapes, self.scene, motion, float(self.margin), float(nearest)))
 
 
@@ -80,11 +88,15 @@ def certify(
     return certify_with(mine, path, openings)
 
 
-def certify_with(mine: Mover, path: NDArray, openings: NDArray | None = None) -> Certificate:
-    """The certificate of a path (n, joints) [rad] by a mover; `openings` (n,) [m] are the mover's own unless given."""
+def certify_with(mine: Mover, path: NDArray, openings: NDArray | None = None, slack: NDArray | None = None) -> Certificate:
+    """The certificate of a path (n, joints) [rad] by a mover; `openings` (n,) [m] are the mover's own unless given.
+
+    What is proved holds as far from each segment as its `slack` (n - 1, joints) [rad]; the least clearance is measured on the segments.
+    """
     openings = np.full(len(path), mine.opening) if openings is None else openings
     if len(path) == 1:
         path, openings = np.repeat(path, 2, axis=0), np.repeat(openings, 2)
+    slack = np.zeros_like(path) if slack is None else slack
     checks, least, at, bodies = 0, FAR_M, (0, 0.0), ()
     for k in range(len(path) - 1):
         pair = (float(openings[k]), float(openings[k + 1]))
@@ -92,7 +104,7 @@ def certify_with(mine: Mover, path: NDArray, openings: NDArray | None = None) ->
             clearance = mine.clearance(path[end], float(openings[end]))
             if clearance.distance < least:
                 least, at, bodies = clearance.distance, (k, float(end - k)), clearance.bodies
-        verdict = mine.verdict(path[k], path[k + 1], pair, nearest=max(least, 0.0))
+        verdict = mine.verdict(path[k], path[k + 1], pair, max(least, 0.0), slack[k])
         checks += verdict.checks
         hit = Hit(*verdict.hit)
         if hit.kind >= 0:

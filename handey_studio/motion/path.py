@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Silent
 from handey_studio.motion.apart import surely_apart
-from handey_studio.motion.certificate import Mover
+from handey_studio.motion.certificate import Mover, certify_with
 from handey_studio.motion.layers import layers_of
-from handey_studio.motion.query import PathOptions, Query, certify_runs, query
+from handey_studio.motion.query import PathOptions, Query, query
 from handey_studio.motion.random_trees import grow_trees
 from handey_studio.motion.results import CSpaceSummary, Leg, PathResult
+from handey_studio.motion.rounding import round_corners
 from handey_studio.motion.shortcut import Route, shorten
 from handey_studio.motion.three_legs import three_legs
 from handey_studio.motion.wrist_ways import held_stretches, wrist_ways
@@ -128,16 +129,17 @@ def _finished(
 ) -> PathResult | None:
     """The path shortened and with its certificate; None, with the reason in the ledger, when the proof of the whole fails."""
     route = shorten(Route(found.points, tuple(found.movers)), asked.free, asked.options.shortcuts, rng)
-    if not route.movers:
-        route = Route(np.array([asked.start, asked.goal]), (asked.leaving,))
-    certificate = certify_runs(route.points, list(route.movers))
+    if route.movers:
+        curve, certificate = round_corners(route, asked.free, asked.world.robot.velocity)
+    else:
+        curve, certificate = None, certify_with(asked.leaving, route.points)
     if not certificate.proved:
         ledger.fall(
             entry, certificate.reason, value=certificate.least_clearance, limit=certificate.margin, unit="m", bodies=certificate.bodies
         )
         return None
     legs = _legs(route.points, asked.world.robot.other_index)
-    return PathResult("found", "", route.points, certificate, legs, found.needed, ledger.entries, space)
+    return PathResult("found", "", route.points, certificate, legs, found.needed, ledger.entries, space, curve=curve)
 
 
 def _legs(points: NDArray, others: NDArray) -> tuple[Leg, ...]:

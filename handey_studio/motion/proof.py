@@ -30,12 +30,13 @@ MAX_HALVINGS = 24  # one part in 16 million of a segment: distances there are co
 
 
 class Motion(NamedTuple):
-    """A joint-linear segment: both ends (n,) [rad], and the hand's opening [m] at them."""
+    """A joint-linear segment: both ends (n,) [rad], the hand's opening [m] at them, and how far (n,) [rad] the way may be off it."""
 
     start: NDArray
     end: NDArray
     opening_start: float
     opening_end: float
+    slack: NDArray
 
 
 class Verdict(NamedTuple):
@@ -181,7 +182,7 @@ def _settle(
 
 @njit(cache=True)
 def prove(chain: Chain, shapes: Shapes, scene: Scene, motion: Motion, margin: float, nearest: float) -> Verdict:
-    """Whether every checked pair stays at least `margin` [m] apart on the whole segment.
+    """Whether every checked pair stays at least `margin` [m] apart on the whole segment, and as far beside it as its slack.
 
     `nearest` [m]: distances below it are measured and the least returned with its place, if any; 0 to measure none.
     """
@@ -212,7 +213,7 @@ def prove(chain: Chain, shapes: Shapes, scene: Scene, motion: Motion, margin: fl
             hit = least_clearance(shapes, corners, scene, best.distance)
             if hit.kind >= 0:
                 best, best_at = hit, t
-        reach = reach_of_motion(shapes, chain, poses, boxes, dq * (width / 2.0), opened * width / 2.0)
+        reach = reach_of_motion(shapes, chain, poses, boxes, dq * (width / 2.0) + motion.slack, opened * width / 2.0)
         place = (poses, opening, corners, placed)
         left, hit = _settle(shapes, scene, place, spans, reach, margin, open_bodies[depth], open_pairs[depth])
         if not left:

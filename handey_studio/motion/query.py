@@ -88,20 +88,23 @@ def _speaker(free: Mover, q: NDArray, allowed: tuple[tuple[str, ...], ...]) -> t
     return (free if not allowed and margin == free.margin else replace(end, margin=margin)), clearance
 
 
-def certify_runs(points: NDArray, movers: list[Mover]) -> Certificate:
-    """One certificate for a path whose segments are spoken for by different movers: the least of all, with the smallest margin."""
+def certify_runs(points: NDArray, movers: list[Mover], slack: NDArray) -> Certificate:
+    """One certificate for a path whose segments are spoken for by different movers: the least of all, with the smallest margin.
+
+    `slack` (n - 1, joints) [rad]: how far the way may be from each segment.
+    """
     total: Certificate | None = None
     first = 0
     for last in range(1, len(movers) + 1):
         if last < len(movers) and movers[last] is movers[first]:
             continue
-        part = certify_with(movers[first], points[first : last + 1])
+        part = certify_with(movers[first], points[first : last + 1], slack=slack[first:last])
         part = replace(part, at=(part.at[0] + first, part.at[1]))
         total = part if total is None else _joined(total, part)
         first = last
         if not part.proved:
             break
-    return total if total is not None else certify_with(movers[0], points)
+    return total if total is not None else certify_with(movers[0], points, slack=slack)
 
 
 def _joined(one: Certificate, other: Certificate) -> Certificate:

@@ -89,7 +89,7 @@ def _branch(tree: Tree, node: int) -> list[NDArray]:
 
 @njit(cache=True)
 def _moves(speaker: Speaker, start: NDArray, end: NDArray) -> bool:
-    motion = Motion(start, end, speaker.opening, speaker.opening)
+    motion = Motion(start, end, speaker.opening, speaker.opening, np.zeros(len(start)))
     return prove(speaker.chain, speaker.shapes, speaker.scene, motion, speaker.margin, 0.0).outcome == PROVED
 
 

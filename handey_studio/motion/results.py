@@ -6,6 +6,7 @@ from typing import Literal
 from numpy.typing import NDArray
 
 from handey_studio.base import Entry, Value, frozen_array
+from handey_studio.motion.curve import Curve
 
 LegName = Literal["start", "free", "goal", "direct", "straight"]
 OTHER_WAY: dict[LegName, LegName] = {"start": "goal", "goal": "start"}
@@ -73,9 +74,11 @@ class CSpaceSummary(Value):
 class PathResult(Value):
     """A certified path, or why there is none.
 
-    `q_rad` (n, joints) [rad], joint-linear between its points; empty (0, joints) when there is none. `legs` name its stretches, `needed`
-    says what beyond the paper's three legs was needed, empty when nothing was. `entries` are the ledger's. `proven`: there is no path at
-    all, for start and goal stay apart even where only what is wholly blocked is taken out.
+    `q_rad` (n, joints) [rad] are its points, empty (0, joints) when there is none; `curve` is the way that the arm takes, straight between
+    them but for what rounds the corners, and what the certificate speaks of. Where the hand goes straight it is at most `off_line` [m]
+    from its lines. `legs` name its stretches, `needed` says what beyond the paper's three legs was needed, empty when nothing was.
+    `entries` are the ledger's. `proven`: there is no path at all, for start and goal stay apart even where only what is wholly blocked
+    is taken out.
     """
 
     status: Literal["found", "none"]
@@ -88,6 +91,8 @@ class PathResult(Value):
     space: CSpaceSummary | None = None
     cancelled: bool = False
     proven: bool = False
+    curve: Curve | None = None
+    off_line: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "q_rad", frozen_array(self.q_rad))
@@ -96,13 +101,19 @@ class PathResult(Value):
     def found(self) -> bool:
         return self.status == "found"
 
+    @property
+    def straight(self) -> bool:
+        """Whether the hand goes straight, and not the joints."""
+        return any(leg.name == "straight" for leg in self.legs)
+
     def reversed(self) -> "PathResult":
         """The same motion the other way round; its certificate holds for both directions."""
         last, certificate = len(self.q_rad) - 1, self.certificate
         if certificate is not None:
             certificate = replace(certificate, at=(max(0, last - 1 - certificate.at[0]), 1.0 - certificate.at[1]))
         legs = tuple(Leg(OTHER_WAY.get(leg.name, leg.name), last - leg.last, last - leg.first) for leg in self.legs[::-1])
-        return replace(self, q_rad=self.q_rad[::-1], certificate=certificate, legs=legs)
+        curve = None if self.curve is None else self.curve.reversed()
+        return replace(self, q_rad=self.q_rad[::-1], certificate=certificate, legs=legs, curve=curve)
 
 
 @dataclass(frozen=True, eq=False)

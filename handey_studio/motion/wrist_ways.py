@@ -67,6 +67,6 @@ def wrist_turns(mover: Mover, start: NDArray, end: NDArray) -> bool:
     nothing = terrain_obstacles(None, 0.0, 0.0)
     ends = np.zeros((2, len(robot.joint_names)))
     ends[:, robot.other_index] = start, end
-    motion = Motion(ends[0].copy(), ends[1].copy(), mover.opening, mover.opening)
+    motion = Motion(ends[0].copy(), ends[1].copy(), mover.opening, mover.opening, np.zeros(len(ends[0])))
     scene = Scene(nothing, nothing, mover.scene.rules)
     return Verdict(*prove(mover.model.chain, shapes, scene, motion, float(mover.margin), 0.0)).outcome == PROVED

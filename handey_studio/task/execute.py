@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Silent, Value, frozen_array
 from handey_studio.cell.protocol import CannotAct, Cell, Moved
-from handey_studio.motion import Trajectory, straight_path, time_path
+from handey_studio.motion import PathResult, Trajectory, straight_path, time_path
 from handey_studio.task.plan import Carry, MovePlan, Step
-from handey_studio.world import Held, Part, World, arm_of
+from handey_studio.world import Held, Part, Robot, World, arm_of
 
 GRIP_TOLERANCE_M = 0.0025  # the fingers' width on a part may differ from the model's by this much
 EARLY_M = 0.004  # contact this far above the commanded pose is something else than the support
@@ -61,18 +61,16 @@ def _do(step: Step, carry: Carry, carried: World, held: Held, cell: Cell, reache
         return "", reached
     if step.kind == "place":
         return _place(step, carry, carried, held, cell), reached
-    start = cell.joints()
-    path = _from_here(step, start)
-    cell.follow(path)
+    cell.follow(_from_here(step, cell.joints(), carried.robot))
     return "", reached
 
 
-def _from_here(step: Step, q: NDArray) -> Trajectory:
+def _from_here(step: Step, q: NDArray, robot: Robot) -> Trajectory:
     """The step's motion, led in from where the guarded descent left the arm: it may have stopped a little off."""
-    openings, times = step.hand_opening_m, step.time_s
-    if np.abs(step.q_rad[0] - q).max() < 1e-9:
-        return Trajectory(times, step.q_rad, openings)
-    return Trajectory(np.concatenate([[0.0], times + 0.2]), np.concatenate([q[None], step.q_rad]), np.concatenate([openings[:1], openings]))
+    opening, lead = step.hand_opening_m, PathResult("found", "", np.array([q, step.q_rad[0]]))
+    led = time_path(robot, lead, float(opening[0]))
+    times = [led.time_s, led.time_s[-1] + step.time_s[1:]]
+    return Trajectory(np.concatenate(times), np.concatenate([led.q_rad, step.q_rad[1:]]), np.concatenate([led.hand_opening_m, opening[1:]]))
 
 
 def _place(step: Step, carry: Carry, carried: World, held: Held, cell: Cell) -> str:

@@ -64,6 +64,8 @@ class Robot(Value):
     The three `arm_joints` span the configuration space, the `wrist_joints` follow the last of them. A redundant arm has h `held_joints`
     as well: inverse kinematics tries them at each row of `held_values` (m, h) [rad] in turn. `arm_index`, `wrist_index` and `held_index`
     pick them out of a configuration, `other_index` all but the arm's. Link `carrier`, moved by the last arm joint, carries the wrist.
+    `velocity`, `acceleration` and `jerk` [rad/s, rad/s², rad/s³] limit every joint, `tool_speed` and `tool_acceleration` [m/s, m/s²] the
+    hand in straight motions.
     """
 
     name: str
@@ -81,12 +83,15 @@ class Robot(Value):
     upper: NDArray
     velocity: NDArray
     acceleration: NDArray
+    jerk: NDArray
+    tool_speed: float
+    tool_acceleration: float
     home: NDArray
     ignored_bodies: tuple[str, ...]
     hand: Hand
 
     def __post_init__(self) -> None:
-        for key in ("T_world_base", "held_values", "lower", "upper", "velocity", "acceleration", "home"):
+        for key in ("T_world_base", "held_values", "lower", "upper", "velocity", "acceleration", "jerk", "home"):
             object.__setattr__(self, key, frozen_array(getattr(self, key)))
 
     @property

@@ -12,7 +12,16 @@ from handey_studio.base import BadInput
 from handey_studio.world.arm import Arm, arm_of
 from handey_studio.world.collision import always_touching, collision_model
 from handey_studio.world.link_body import LinkBody
-from handey_studio.world.robot_file import read_table, robot_faults, robot_of, table_faults, unknown_keys
+from handey_studio.world.robot_file import (
+    RISE_S,
+    TOOL_ACCELERATION_M_S2,
+    TOOL_SPEED_M_S,
+    read_table,
+    robot_faults,
+    robot_of,
+    table_faults,
+    unknown_keys,
+)
 from handey_studio.world.world import EVERYWHERE, NO_TABLE, World
 
 POSTURES = 300
@@ -168,6 +177,13 @@ def _facts(arm: Arm) -> Iterator[str]:
     yield f"{arm.n} joints: {', '.join(robot.arm_joints)} span the configuration space, {', '.join(robot.wrist_joints)} turn the wrist."
     for name, values in zip(robot.held_joints, np.rad2deg(robot.held_values).T, strict=True):
         yield f"{name} is held at {', '.join(f'{value:g}°' for value in dict.fromkeys(values))}, tried in turn."
+    rise = 1e3 * robot.acceleration / robot.jerk
+    rises = f"{rise.min():.0f} ms" if np.ptp(rise) < 1.0 else f"{rise.min():.0f} to {rise.max():.0f} ms"
+    yield f"the joints take {rises} to their full acceleration (limits.jerk_deg_s3, {1e3 * RISE_S:.0f} ms unless given)."
+    yield (
+        f"straight motions of the hand run at up to {robot.tool_speed:g} m/s and {robot.tool_acceleration:g} m/s² (limits.tool_speed_m_s, "
+        f"{TOOL_SPEED_M_S:g} unless given, and limits.tool_acceleration_m_s2, {TOOL_ACCELERATION_M_S2:g})."
+    )
     yield f"{len(arm.bodies)} collision bodies in {sum(len(body.hulls) for body in arm.bodies)} convex pieces."
     least, most, out = 1e3 * hand.opening_min, 1e3 * hand.opening_max, 1e3 * float(hand.T_flange_hand[2, 3])
     yield f"the hand opens from {least:g} to {most:g} mm, its fingertips are {out:g} mm from the flange."

@@ -18,6 +18,9 @@ from handey_studio.world.robot import Hand, Robot
 EXAMPLE_ROBOT_DATA = "example-robot-data:"
 TEXT, TEXTS, NUMBER, NUMBERS, TABLE = "a text", "a list of texts", "a finite number", "a list of finite numbers", "a table"
 LIMITS = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
+PER_JOINT = (*LIMITS, "jerk_deg_s3")
+RISE_S = 0.1  # without jerk_deg_s3 a joint takes this long from rest to its full acceleration
+TOOL_SPEED_M_S, TOOL_ACCELERATION_M_S2 = 0.25, 1.2  # of straight motions: what Universal Robots' controllers take unless told otherwise
 LENGTHS = (
     "finger_length_m",
     "finger_width_m",
@@ -45,6 +48,9 @@ REQUIRED = {
     "hand.mount.xyz_m": NUMBERS,
 }
 OPTIONAL = {
+    "limits.jerk_deg_s3": NUMBERS,
+    "limits.tool_speed_m_s": NUMBER,
+    "limits.tool_acceleration_m_s2": NUMBER,
     "joints": TEXTS,
     "ignored_bodies": TEXTS,
     "held_joints": TABLE,
@@ -133,7 +139,7 @@ def _joint_faults(table: dict[str, Any], present: dict[str, Any]) -> Iterator[st
         yield f"has joints = {joints}; it must name each of arm_joints, wrist_joints and held_joints once."
     elif [name for name in joints if name not in held] != arm + wrist:
         yield f"has joints = {joints}; without the held ones they must be arm_joints, then wrist_joints: {arm + wrist}."
-    for key in ("home_deg", *(f"limits.{key}" for key in LIMITS)):
+    for key in ("home_deg", *(f"limits.{key}" for key in PER_JOINT)):
         if len(present.get(key, joints)) != len(joints):
             yield f"has {len(present[key])} numbers in {key}; it must list {len(joints)} finite numbers, one a joint."
     for key in ("base.xyz_m", "base.rpy_deg", "hand.mount.xyz_m", "hand.mount.rpy_deg"):
@@ -145,7 +151,7 @@ def robot_of(table: dict[str, Any], folder: Path) -> Robot:
     """The robot of a faultless table. Raises BadInput if its URDF does not exist."""
     urdf, packages = _urdf_path(table["urdf"], folder)
     held = table.get("held_joints", {})
-    limits = {key: np.deg2rad(table["limits"][key]) for key in LIMITS}
+    limits = {key: np.deg2rad(table["limits"][key]) for key in PER_JOINT if key in table["limits"]}
     return Robot(
         name=table["name"],
         urdf=urdf,
@@ -162,6 +168,9 @@ def robot_of(table: dict[str, Any], folder: Path) -> Robot:
         upper=limits["upper_deg"],
         velocity=limits["velocity_deg_s"],
         acceleration=limits["acceleration_deg_s2"],
+        jerk=limits.get("jerk_deg_s3", limits["acceleration_deg_s2"] / RISE_S),
+        tool_speed=float(table["limits"].get("tool_speed_m_s", TOOL_SPEED_M_S)),
+        tool_acceleration=float(table["limits"].get("tool_acceleration_m_s2", TOOL_ACCELERATION_M_S2)),
         home=np.deg2rad(table["home_deg"]),
         ignored_bodies=tuple(table.get("ignored_bodies", ())),
         hand=_hand(table["hand"]),
@@ -190,8 +199,10 @@ def robot_faults(robot: Robot) -> Iterator[str]:
             yield f"the limits of {joint} are {lower:g}° to {upper:g}°; lower_deg must lie below upper_deg."
         elif not lower <= home <= upper:
             yield f"home_deg lies outside the joint limits: {joint} at {home:g}°, it takes {lower:g}° to {upper:g}°."
-        if not (robot.velocity[k] > 0 and robot.acceleration[k] > 0):
-            yield f"velocity_deg_s and acceleration_deg_s2 of {joint} must be above 0."
+        if not (robot.velocity[k] > 0 and robot.acceleration[k] > 0 and robot.jerk[k] > 0):
+            yield f"velocity_deg_s, acceleration_deg_s2 and jerk_deg_s3 of {joint} must be above 0."
+    if not (robot.tool_speed > 0 and robot.tool_acceleration > 0):
+        yield "limits.tool_speed_m_s and limits.tool_acceleration_m_s2 must be above 0."
     for k, column in zip(robot.held_index, robot.held_values.T, strict=True):
         low, high = np.rad2deg([robot.lower[k], robot.upper[k]])
         for value in np.rad2deg(column[(column < robot.lower[k]) | (column > robot.upper[k])]):
