@@ -104,15 +104,14 @@ def free_patches(
     ledger, found = Ledger(), []
     for raised in (False, True)[: 1 + options.raised]:
         counts = np.zeros(len(WORDS) + 1, dtype=int)
-        for patch in _patches(world, ground, places, poses, prints, wanted, raised, counts):
+        patches = _patches(world, ground, places, poses, prints, wanted, raised, counts)
+        while len(found) < options.count and (patch := next(patches, None)) is not None:
             if all(np.linalg.norm(patch.T_world_part[:2, 3] - other.T_world_part[:2, 3]) >= options.spacing for other in found):
                 found.append(patch)
-            if len(found) >= options.count:
-                break
         for code, words in WORDS.items():
             if counts[code]:
-                where = "raised" if raised else "table"
-                ledger.add("free patch", f"{counts[code]} places on {where}", words, value=float(counts[code]), limit=0.0)
+                option = f"{counts[code]} raised places" if raised else f"{counts[code]} places on the table"
+                ledger.add("free patch", option, words, value=float(counts[code]))
     return tuple(found), ledger.entries
 
 
