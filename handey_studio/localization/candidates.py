@@ -25,8 +25,8 @@ SAME_SHARE = 0.04  # of a part's diameter: hypotheses nearer than this are one
 EVERY = 6  # samples that the first verification looks at: one in so many
 FIRST_STEPS, LAST_STEPS = 4, 8  # of refinement, with few samples over rough limits, and with all over tight ones
 MOST_A_PLACE = 20  # hypotheses refined of those whose middles lie together
-MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE = 32, 4
-MOST_POLISHED, POLISHED_FROM = 12, 0.01  # poses refined from all readings, and how probable they must be
+MOST_REFINED_AGAIN, MOST_AGAIN_A_PLACE = 24, 4
+MOST_POLISHED, POLISHED_FROM = 8, 0.01  # poses refined from all readings, and how probable they must be
 
 
 Watch = Callable[[str, NDArray, NDArray, NDArray], None]  # is shown "rough" or "refined" poses R, t and their features of promise

@@ -1,4 +1,4 @@
-"""Edges merged again where dropouts break them: two pieces of one line, between which the sensor read nothing, are one edge.
+"""Edges merged again where dropouts break them: two pieces of one line are one edge if nothing that was read between them says otherwise.
 
 A gap that was seen stays one: two parts in line are two edges, and so is an edge that something nearer crosses.
 """
@@ -16,7 +16,7 @@ SIGMAS = 3.0  # by which two pieces of one line may lie off one another
 UNSURE_ANGLE, MOST_ANGLE = np.deg2rad(0.5), np.deg2rad(8.0)  # adds to the sigma of an angle; the widest that is one direction
 ALIKE = np.cos(np.deg2rad(20.0))  # between the surfaces beside two pieces of one edge
 MARGIN_PX = 3  # beside a dropout, where windows are cut short and ends are trimmed
-UNREAD_OF_ALL = 0.25  # share of a gap that must be without readings
+UNREAD_OF_ALL = 0.25  # share of a crease's gap that must be without readings
 OTHER = 0.2  # share of it, less its margins, that may show something else than the edge or its surface
 KEPT = 0.8  # of both pieces' pixels that must keep to the common line
 

@@ -22,7 +22,7 @@ class LocateOptions:
     min_edge_m: float | None = None
     max_data_edges: int = 600
     max_hypotheses: int = 40000
-    max_refined: int = 160
+    max_refined: int = 120
     table_z_m: float | None = 0.0
 
 
