@@ -137,7 +137,8 @@ def nearest_cells(regions: Regions, layer: int, place: NDArray, region: int, cou
     order = mine[np.argsort(squares[mine], kind="stable")][: count * count]
     cells = np.column_stack([regions.rows[order, 1:], nearest[order]])
     amid = np.column_stack([regions.rows[order, 1:], (regions.first[order] + regions.last[order] - 1) // 2])
-    cells = np.unique(np.concatenate([cells, amid]), axis=0)
+    cells = np.concatenate([cells, amid])
+    cells = cells[np.unique(np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1)), return_index=True)[1]]
     cells = cells[np.argsort(((cells - place) ** 2).sum(axis=1), kind="stable")]
     keep = min(len(cells), count * count)
     return cells[np.unique(np.minimum((np.arange(count) ** 1.9).astype(int), keep - 1))]

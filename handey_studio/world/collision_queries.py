@@ -92,6 +92,17 @@ def bounds(shapes: Shapes, corners: NDArray) -> NDArray:
 
 
 @njit(cache=True)
+def _box_distance(corners: NDArray, first: int, last: int, low: NDArray, high: NDArray, box: NDArray, limit: float) -> float:
+    """Distance [m] of one placed body to an axis-aligned box, whose corners are written to `box` (8, 3); some value ≥ `limit` when that is
+    certain. A long body's own box holds far more of the depth map's columns than come near the body.
+    """
+    for k in range(8):
+        for axis in range(3):
+            box[k, axis] = high[axis] if (k >> axis) & 1 else low[axis]
+    return distance(corners, first, last, box, 0, 8, limit)
+
+
+@njit(cache=True)
 def nearest_obstacle(
     corners: NDArray, first: int, last: int, span: NDArray, fixed: Obstacles, rules: NDArray, rule: int, limit: float
 ) -> tuple[float, int]:
@@ -103,7 +114,7 @@ def nearest_obstacle(
     tree = fixed.tree
     if len(tree.left) == 0:
         return best, found
-    todo = np.empty(128, np.int64)
+    todo, box = np.empty(128, np.int64), np.empty((8, 3))
     todo[0], depth = 0, 1
     while depth > 0:
         depth -= 1
@@ -118,6 +129,8 @@ def nearest_obstacle(
                     best, found = d, k
                 if best <= 0.0:
                     return best, found
+            continue
+        if _box_distance(corners, first, last, tree.low[node], tree.high[node], box, best) >= best:
             continue
         near, far = tree.left[node], tree.right[node]
         if box_gap(span[0], span[1], tree.low[far], tree.high[far]) < box_gap(span[0], span[1], tree.low[near], tree.high[near]):
