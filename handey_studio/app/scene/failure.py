@@ -10,6 +10,7 @@ from handey_studio.app.scene.robot import creased
 from handey_studio.app.scene.units import SCALE, place, scaled
 from handey_studio.app.state import State
 from handey_studio.base import Entry, Posture
+from handey_studio.session.failing import hand_of, pose_of, readings_met
 from handey_studio.world import Robot, arm_of
 
 ROOT = "/failure"
@@ -35,17 +36,17 @@ class FailureScene:
             self._arm(new.robot, entry.posture, entry.bodies)
             self._part(new, entry, entry.posture)
         self._others(new, entry)
+        self._readings(new, entry)
 
     def _arm(self, robot: Robot, posture: Posture, bodies: tuple[str, ...]) -> None:
         """The arm at its joints, or the hand alone."""
         arm = arm_of(robot)
-        hand = pose_of(posture.T_world_hand)
+        hand = hand_of(robot, posture)
         if len(posture.q_rad) == arm.n:
             q = np.array(posture.q_rad)
             for number, body in enumerate(arm.bodies):
                 vertices, triangles = creased(body)
                 self._mesh(f"link{number}", vertices, triangles, arm.link_poses(q)[body.link], body.name in bodies)
-            hand = arm.hand_pose(q)
         if hand is None:
             return
         for name, (lower, upper) in robot.hand.boxes(posture.opening_m).items():
@@ -72,6 +73,17 @@ class FailureScene:
             met = posture.part in entry.bodies
             add_solid(self._scene, f"{ROOT}/part", part, palette.VERMILLION if met else palette.TEAL, T, SOLID if met else GHOST)
 
+    def _readings(self, state: State, entry: Entry) -> None:
+        """Readings that reach into what met the depth map."""
+        if state.session.scan is None:
+            return
+        met = readings_met(state.session.scan, state.robot, entry)
+        if len(met):
+            colours = np.tile(np.array(palette.VERMILLION, dtype=np.uint8), (len(met), 1))
+            self._scene.add_point_cloud(
+                f"{ROOT}/readings", scaled(met), colours, point_size=0.025, point_shape="circle", precision="float32"
+            )
+
     def _others(self, state: State, entry: Entry) -> None:
         """Located parts and known blocks that were met."""
         moved = entry.posture.part if entry.posture is not None and entry.posture.T_world_part else ""
@@ -84,8 +96,3 @@ class FailureScene:
                     f"{ROOT}/block{number}", color=palette.VERMILLION, dimensions=tuple(1.002 * block.size * SCALE), opacity=SOLID
                 )
                 place(box, block.T_world_block)
-
-
-def pose_of(numbers: tuple[float, ...]) -> NDArray | None:
-    """The pose (4, 4) of sixteen numbers, None if there are none."""
-    return np.array(numbers).reshape(4, 4) if len(numbers) == 16 else None
