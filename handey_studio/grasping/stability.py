@@ -179,7 +179,7 @@ def _slip_planes(pads: list[tuple[NDArray, float]], directions: int) -> NDArray:
     """Planes (m, 3) within which friction's (fy, fz, τx) lie: the hull of points on the boundary of the sum of all bits' discs."""
     reach = max(LEAST_REACH_M, max(float(np.linalg.norm(points, axis=1).max()) for points, _ in pads))
     u = _sphere(directions) / (1.0, 1.0, reach)
-    boundary = np.zeros((directions, 3))
+    boundary = np.zeros((len(u), 3))
     for points, most in pads:
         pull = u[:, None, :2] + u[:, 2, None, None] * np.c_[-points[:, 1], points[:, 0]]
         force = most * pull / np.maximum(np.linalg.norm(pull, axis=2, keepdims=True), 1e-12)
@@ -203,11 +203,11 @@ def _planes(points: NDArray, scale: NDArray) -> NDArray:
 
 
 def _sphere(count: int) -> NDArray:
-    """Unit vectors (count, 3) spread evenly over the sphere."""
+    """Unit vectors (count + 6, 3): those along the axes, and others spread evenly over the sphere."""
     k = np.arange(count) + 0.5
     height, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
     ring = np.sqrt(1.0 - height**2)
-    return np.c_[ring * np.cos(turn), ring * np.sin(turn), height]
+    return np.concatenate([np.eye(3), -np.eye(3), np.c_[ring * np.cos(turn), ring * np.sin(turn), height]])
 
 
 def _plain(v: NDArray) -> tuple[float, float, float]:
