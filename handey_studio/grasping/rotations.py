@@ -168,8 +168,8 @@ def legal_rotations(group: GraspGroup, pickup: GraspEnd, putdown: GraspEnd) -> L
     """The angles at which the hand, about the group's point, is clear at both ends: open, closed on the part, and on its way between.
 
     Both ends' obstacles are looked at in the part's own frame: the putdown's are carried back by the inverse of the part's motion. The
-    ranges are exact for convex bodies kept HAND_MARGIN_M away (squarely at the hand's corners); for the depth map's columns they are a
-    millimetre wide. Contact is looked at every CONTACT_STEP_RAD.
+    ranges are exact for convex bodies kept HAND_MARGIN_M away (squarely at the hand's corners), and for the depth map's columns made up
+    to a millimetre larger. Contact is looked at every CONTACT_STEP_RAD.
     """
     hand, window = pickup.world.robot.hand, (group.angle - REACH_RAD, group.angle + REACH_RAD)
     own = pickup.own or putdown.own
