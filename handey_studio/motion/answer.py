@@ -55,6 +55,7 @@ def path_report(answer: PathAnswer) -> dict[str, Any]:
         "status": result.status,
         "reason": result.reason,
         "proven": result.proven,
+        "separating": list(result.separating),
         "needed": result.needed,
         "joint_names": list(answer.robot.joint_names),
         "time_s": trajectory.time_s.tolist() if trajectory else [],

@@ -1,5 +1,6 @@
 """Collision-free, certified paths between two configurations (Handey 1987 §4)."""
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from handey_studio.motion.three_legs import three_legs
 from handey_studio.motion.wrist_ways import held_stretches, wrist_ways
 from handey_studio.world import Held, World
 from handey_studio.world.collision import Pairs
+from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, TABLE
 
 STAGE = "path"
 FEW_GROWTHS = 2000  # of the random trees, before it is asked whether there can be a path at all
@@ -33,6 +35,7 @@ class Attempt(NamedTuple):
     space: CSpaceSummary | None
     reason: str
     proven: bool = False
+    bodies: tuple[str, ...] = ()
 
 
 def plan_path(
@@ -65,17 +68,27 @@ def plan_path(
     space: CSpaceSummary | None = None
     for attempt in _attempts(asked, rng, progress):
         space = attempt.space if len(attempt.points) or space is None else space
-        entry = ledger.add(STAGE, attempt.needed or "three legs", attempt.reason or None)
+        entry = ledger.add(STAGE, attempt.needed or "three legs", attempt.reason or None, bodies=attempt.bodies)
         if len(attempt.points):
             result = _finished(asked, attempt, space, ledger, entry, rng)
             if result is not None:
                 return result
-        if attempt.proven:
-            return PathResult("none", attempt.reason, np.empty((0, len(asked.start))), entries=ledger.entries, space=space, proven=True)
-        if progress.cancelled:
-            return PathResult("none", "cancelled", np.empty((0, len(asked.start))), entries=ledger.entries, space=space, cancelled=True)
+        if attempt.proven or progress.cancelled:
+            return _none(asked, attempt.reason if attempt.proven else "cancelled", ledger, space, attempt.proven)
     reasons = dict.fromkeys(entry.reason for entry in ledger.entries if entry.reason)
-    return PathResult("none", "; ".join(reasons), np.empty((0, len(asked.start))), entries=ledger.entries, space=space)
+    return _none(asked, "; ".join(reasons), ledger, space, False)
+
+
+def _none(asked: Query, reason: str, ledger: Ledger, space: CSpaceSummary | None, proven: bool) -> PathResult:
+    """No path, with the bodies of the world that the attempts met, and the one that the straight way meets."""
+    world = asked.world
+    fixed = {DEPTH_MAP, TABLE, OUTSIDE} | {thing.name for thing in (*world.blocks, *world.parts)}
+    told = [entry.bodies for entry in ledger.entries] + [asked.free.obstacle(asked.start, asked.goal)]
+    separating = tuple(name for name, _ in Counter(name for bodies in told for name in bodies if name in fixed).most_common())
+    nothing, cancelled = np.empty((0, len(asked.start))), reason == "cancelled"
+    return PathResult(
+        "none", reason, nothing, entries=ledger.entries, space=space, cancelled=cancelled, proven=proven, separating=separating
+    )
 
 
 def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Iterator[Attempt]:
@@ -90,7 +103,7 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
     for k, (needed, stretches, step) in enumerate(plans):
         progress.report(k / (len(plans) + 1), f"configuration space of the arm joints, {step:g}° cells")
         found = three_legs(asked, layers_of(asked, stretches, float(np.deg2rad(step))))
-        yield Attempt(needed, found.points, found.movers, found.space, found.reason)
+        yield Attempt(needed, found.points, found.movers, found.space, found.reason, bodies=found.bodies)
     few = min(FEW_GROWTHS, asked.options.tree_growths)
     for most in dict.fromkeys((few, asked.options.tree_growths)):
         points, movers, grown = grow_trees(asked, most, rng, progress)

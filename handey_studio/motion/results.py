@@ -78,7 +78,7 @@ class PathResult(Value):
     them but for what rounds the corners, and what the certificate speaks of. Where the hand goes straight it is at most `off_line` [m]
     from its lines. `legs` name its stretches, `needed` says what beyond the paper's three legs was needed, empty when nothing was.
     `entries` are the ledger's. `proven`: there is no path at all, for start and goal stay apart even where only what is wholly blocked
-    is taken out.
+    is taken out. `separating` names the bodies of the world that the attempts met when there is no path, most often first.
     """
 
     status: Literal["found", "none"]
@@ -93,6 +93,7 @@ class PathResult(Value):
     proven: bool = False
     curve: Curve | None = None
     off_line: float = 0.0
+    separating: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "q_rad", frozen_array(self.q_rad))

@@ -19,23 +19,27 @@ from handey_studio.motion.search import find_cells
 
 @dataclass(frozen=True, eq=False)
 class ThreeLegs:
-    """What one stack of spaces gave: the path's points (n, joints) [rad] and the mover of each segment, empty when none; `reason` why."""
+    """What one stack of spaces gave: the path's points (n, joints) [rad] and the mover of each segment, empty when none; `reason` why, and
+    the `bodies` in the way.
+    """
 
     points: NDArray
     movers: list[Mover]
     reason: str
     space: CSpaceSummary
+    bodies: tuple[str, ...] = ()
 
 
 def three_legs(query: Query, layers: Layers) -> ThreeLegs:
     """The three legs in a stack of spaces."""
     regions = layers.common_regions(query.start, query.goal, query.options.regions)
-    reason = "" if regions else apart(query, layers)
+    reason, bodies = ("", ()) if regions else apart(query, layers)
     for region in regions:
         first = leg_to_free(query.leaving, layers, 0, query.start, region)
         last = leg_to_free(query.arriving, layers, len(layers.spaces) - 1, query.goal, region) if first else None
         if first is None or last is None:
-            reason = reason or _unreached(query, layers, region, first is None)
+            if not reason:
+                reason, bodies = _unreached(query, layers, region, first is None)
             continue
         between, cells = _free_leg(query, layers, first[1], last[1])
         if not len(between):
@@ -44,11 +48,11 @@ def three_legs(query: Query, layers: Layers) -> ThreeLegs:
         points = np.concatenate([first[0], between[1:], last[0][::-1][1:]])
         movers = [query.leaving, *[query.free] * (len(between) - 1), query.arriving]
         return ThreeLegs(points, movers, "", summary(layers, cells))
-    return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(layers, np.empty((0, 4))))
+    return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(layers, np.empty((0, 4))), bodies)
 
 
-def _unreached(query: Query, layers: Layers, region: int, at_start: bool) -> str:
-    """Why no straight leg joins an end to a region, with the bodies in the way to its nearest cell."""
+def _unreached(query: Query, layers: Layers, region: int, at_start: bool) -> tuple[str, tuple[str, ...]]:
+    """Why no straight leg joins an end to a region, and the bodies in the way to its nearest cell."""
     name, q, mover, layer = (
         ("start", query.start, query.leaving, 0) if at_start else ("goal", query.goal, query.arriving, len(layers.spaces) - 1)
     )
@@ -56,24 +60,25 @@ def _unreached(query: Query, layers: Layers, region: int, at_start: bool) -> str
     cell = nearest_cells(layers.regions, layer, space.place(q), region, 1)[0]
     bodies = mover.obstacle(q, space.at(cell, q))
     between = f": {' and '.join(bodies)} are in the way" if bodies else ""
-    return f"the {name} does not reach the free cells nearest to it{between}"
+    return f"the {name} does not reach the free cells nearest to it{between}", bodies
 
 
-def apart(query: Query, layers: Layers) -> str:
+def apart(query: Query, layers: Layers) -> tuple[str, tuple[str, ...]]:
     """Why no free region is near both ends: what stands between the region nearest to the start and the one nearest to the goal."""
     last = len(layers.spaces) - 1
     ends = [(0, query.start), (last, query.goal)]
     distances = [region_distances(layers.regions, layer, layers.spaces[layer].place(q)) for layer, q in ends]
     for (_, q), least, name in zip(ends, distances, ("start", "goal"), strict=True):
         if not np.isfinite(least).any():
-            return f"no cell is wholly free with the wrist as it is at the {name}, where {query.free.clearance(q)}"
+            nearest = query.free.clearance(q)
+            return f"no cell is wholly free with the wrist as it is at the {name}, where {nearest}", nearest.bodies
     regions = [int(np.argmin(least)) + 1 for least in distances]
     space = layers.spaces[last]
     goal = nearest_cells(layers.regions, last, space.place(query.goal), regions[1], 1)[0]
     start = nearest_cells(layers.regions, 0, goal, regions[0], 1)[0]
     bodies = query.free.obstacle(space.at(goal, query.goal), space.at(start, query.goal))
     between = f": {' and '.join(bodies)} are between them" if bodies else ""
-    return f"start and goal lie in free regions {regions[0]} and {regions[1]} of {layers.regions.count}, which are apart{between}"
+    return f"start and goal lie in free regions {regions[0]} and {regions[1]} of {layers.regions.count}, which are apart{between}", bodies
 
 
 def _free_leg(query: Query, layers: Layers, first: NDArray, last: NDArray) -> tuple[NDArray, NDArray]:

@@ -35,6 +35,7 @@ def test_ends_on_both_sides_of_walls_are_proved_apart(parted):
     start, goal = free_at(parted, -1), free_at(parted, 1)
     refused = plan_path(parted, start, goal, 0.0, options=PathOptions(steps_deg=(5.0,), tree_growths=20))
     assert refused.status == "none" and refused.proven and "wholly blocked" in refused.reason
+    assert refused.separating and set(refused.separating) <= {"ceiling", "wall -1", "wall +1", "table"}
     fallen = [entry.reason for entry in refused.entries if entry.reason]
     assert any("mm apart" in reason or "in the way" in reason or "between them" in reason for reason in fallen), fallen
 
