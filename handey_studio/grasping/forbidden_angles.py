@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 MOST_RANGES = 64  # of one body; with more, the nearest two become one
 WHOLE_TURN = 2.0 * np.pi
+TOUCHING_RAD = 1e-9  # ranges nearer than this are one: their ends are rounded
 
 
 @njit(cache=True)
@@ -92,7 +93,7 @@ def insert(first: float, last: float, window: tuple[float, float], ranges: NDArr
         low, high = max(first + turn, window[0]), min(last + turn, window[1])
         k = 0
         while k < counts[body]:
-            if ranges[body, k, 0] <= high and low <= ranges[body, k, 1]:
+            if ranges[body, k, 0] <= high + TOUCHING_RAD and low <= ranges[body, k, 1] + TOUCHING_RAD:
                 low, high = min(low, ranges[body, k, 0]), max(high, ranges[body, k, 1])
                 counts[body] -= 1
                 ranges[body, k, 0], ranges[body, k, 1] = ranges[body, counts[body], 0], ranges[body, counts[body], 1]
@@ -144,7 +145,7 @@ def polygon_ranges(
     while n > 2 and low < window[1]:
         for k in range(counts[body]):
             if ranges[body, k, 0] <= low <= ranges[body, k, 1]:
-                low = ranges[body, k, 1] + 1e-12
+                low = ranges[body, k, 1] + 0.5 * TOUCHING_RAD
                 break
         after = _next_start(low, ranges[body], counts[body])
         high = ranges[body, after, 0] if after >= 0 else window[1]
