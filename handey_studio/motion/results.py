@@ -103,6 +103,11 @@ class PathResult(Value):
         return self.status == "found"
 
     @property
+    def way(self) -> NDArray:
+        """The curve in short straight steps: its points (k, joints) [rad], or the path's own where it has none."""
+        return self.q_rad if self.curve is None else self.curve.at(self.curve.chords()[0])
+
+    @property
     def straight(self) -> bool:
         """Whether the hand goes straight, and not the joints."""
         return any(leg.name == "straight" for leg in self.legs)

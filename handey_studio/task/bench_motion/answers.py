@@ -50,7 +50,7 @@ class Handey:
         rng = np.random.default_rng(seed)
         begun = time.perf_counter()
         result = plan_path(problem.world, problem.start, problem.goal, problem.opening, problem.held, rng=rng)
-        return Answer(result.q_rad, time.perf_counter() - begun, result.reason, result.needed)
+        return Answer(result.way, time.perf_counter() - begun, result.reason, result.needed)
 
 
 def judged(problem: Problem, answer: Answer) -> dict[str, Any]:
