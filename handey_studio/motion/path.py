@@ -104,6 +104,8 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
         progress.report(k / (len(plans) + 1), f"configuration space of the arm joints, {step:g}° cells")
         found = three_legs(asked, layers_of(asked, stretches, float(np.deg2rad(step))))
         yield Attempt(needed, found.points, found.movers, found.space, found.reason, bodies=found.bodies)
+    if not asked.options.tree_growths:
+        return
     few = min(FEW_GROWTHS, asked.options.tree_growths)
     for most in dict.fromkeys((few, asked.options.tree_growths)):
         points, movers, grown = grow_trees(asked, most, rng, progress)

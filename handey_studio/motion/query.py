@@ -20,7 +20,7 @@ class PathOptions:
     `straight` whether the straight way is looked at before a space is built.
     `steps_deg` widths of the cells, tried in turn; each divides a turn. `regions` free regions tried a space,
     `repairs` searches after the whole arm failed in some cells, `shortcuts` random short cuts tried,
-    `tree_growths` extensions of the random trees, the last resort.
+    `tree_growths` extensions of the random trees, the last resort, before which a proof of none is sought; 0 for neither.
     """
 
     margin_m: float = MARGIN_M
