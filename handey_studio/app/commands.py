@@ -55,7 +55,7 @@ class ChoosePart:
 
 @dataclass(frozen=True)
 class SetDestination:
-    """TO these words: `x,y,z[,roll,pitch,yaw]` or `on:PART[:POSE]`."""
+    """TO these words: `x,y,z[,roll,pitch,yaw]`, `on:PART[:POSE]` or `in:x0,y0,x1,y1`."""
 
     to: str
     label: str = "set destination"

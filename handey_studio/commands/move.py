@@ -20,7 +20,7 @@ HELP = "run a session's MOVEs: sense, plan, execute"
 def add_arguments(move: argparse.ArgumentParser) -> None:
     move.add_argument("session", help="a session file, or its name in a library")
     move.add_argument("--part", help="move this part instead of running the session's own commands")
-    move.add_argument("--to", metavar="DESTINATION", help="x,y,z[,roll,pitch,yaw] (metres, degrees) or on:PART[:POSE]")
+    move.add_argument("--to", metavar="DESTINATION", help="x,y,z[,roll,pitch,yaw] (metres, degrees), on:PART[:POSE] or in:x0,y0,x1,y1")
     move.add_argument("--robot", help="a robot of the library, or a folder with a robot.toml, instead of the session's own")
     move.add_argument("--seed", type=int, help="instead of the session's own seed")
     move.add_argument("--json", type=Path, help="where the steps, the certificate and the ledger go")

@@ -34,7 +34,8 @@ TURNED = np.diag([-1.0, -1.0, 1.0, 1.0])  # the hand looks the same with its fin
 class PatchOptions:
     """Lengths in metres. The part keeps `part_gap` from everything that it does not stand on, the open hand `hand_gap`; what it stands on
     is level within `level`. At most `count` patches, `spacing` apart, in a ring around the robot's base between the shares `nearest` and
-    `farthest` of its reach, those near the share `best` first. `raised` asks for patches that are not the table as well, after those."""
+    `farthest` of its reach, those near the share `best` first. `raised` asks for patches that are not the table as well, after those.
+    `area` (x0, y0, x1, y1) [m] in the world holds the places, which may be anywhere if it is None."""
 
     count: int = 6
     spacing: float = 0.06
@@ -47,6 +48,7 @@ class PatchOptions:
     best: float = 0.46
     farthest: float = 0.75
     raised: bool = False
+    area: tuple[float, float, float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +138,8 @@ def _ground(world: World, near: NDArray | None, options: PatchOptions) -> tuple[
     if near is not None:
         cost += np.linalg.norm(centres - near, axis=-1) / reach
     inside = (distance >= options.nearest) & (distance <= options.farthest)
+    if options.area is not None:
+        inside &= ((centres >= options.area[:2]) & (centres <= options.area[2:])).all(axis=-1)
     order = np.argsort(cost[inside], kind="stable")
     return ground, np.argwhere(inside)[order] * step
 

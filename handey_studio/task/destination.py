@@ -1,4 +1,4 @@
-"""Destinations as people type them: `x,y,z[,roll,pitch,yaw]` or `on:PART[:POSE]`."""
+"""Destinations as people type them: `x,y,z[,roll,pitch,yaw]`, `on:PART[:POSE]` or `in:x0,y0,x1,y1`."""
 
 from dataclasses import dataclass
 
@@ -31,7 +31,15 @@ class MatingPose:
     pose: str
 
 
-Destination = FixedPose | MatingPose
+@dataclass(frozen=True)
+class Area:
+    """Anywhere in a rectangle of the world, from `low` (x, y) to `high` [m], standing as it may."""
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+
+Destination = FixedPose | MatingPose | Area
 
 
 def base_name(name: str) -> str:
@@ -43,12 +51,15 @@ def parse_destination(text: str, moved: str, parts: dict[str, Part]) -> Destinat
     """What a destination means for the part `moved` (a name or an instance). Raises BadInput with one sentence."""
     if text.startswith("on:"):
         return _parse_mating(text, moved, parts)
+    if text.startswith("in:"):
+        return _parse_area(text)
     words = text.split(",")
     try:
         numbers = [float(word) for word in words]
     except ValueError:
         raise BadInput(
-            f'destination "{text[:80]}" is not understood; give x,y,z[,roll,pitch,yaw] in metres and degrees, or on:PART[:POSE].'
+            f'destination "{text[:80]}" is not understood; give x,y,z[,roll,pitch,yaw] in metres and degrees, '
+            "on:PART[:POSE] or in:x0,y0,x1,y1."
         ) from None
     if len(numbers) not in (3, 6) or not np.isfinite(numbers).all():
         raise BadInput(f'destination "{text[:80]}" has {len(numbers)} numbers; it takes 3 or 6 finite ones: x,y,z[,roll,pitch,yaw].')
@@ -56,6 +67,17 @@ def parse_destination(text: str, moved: str, parts: dict[str, Part]) -> Destinat
     if farthest > MAX_COORDINATE_M:
         raise BadInput(f'destination "{text[:80]}" lies {farthest:g} m away, the limit is {MAX_COORDINATE_M:g} m; are these metres?')
     return FixedPose(from_xyz_rpy(numbers[:3], np.deg2rad(numbers[3:] or (0.0, 0.0, 0.0))))
+
+
+def _parse_area(text: str) -> Area:
+    words = text.removeprefix("in:").split(",")
+    try:
+        x0, y0, x1, y1 = (float(word) for word in words)
+    except ValueError:
+        raise BadInput(f'area "{text[:80]}" is not in:x0,y0,x1,y1, four numbers in metres.') from None
+    if not np.isfinite([x0, y0, x1, y1]).all() or max(map(abs, (x0, y0, x1, y1))) > MAX_COORDINATE_M or x0 == x1 or y0 == y1:
+        raise BadInput(f'area "{text[:80]}" must have two different x and two different y within {MAX_COORDINATE_M:g} m; are these metres?')
+    return Area((min(x0, x1), min(y0, y1)), (max(x0, x1), max(y0, y1)))
 
 
 def _parse_mating(text: str, moved: str, parts: dict[str, Part]) -> MatingPose:
@@ -74,7 +96,10 @@ def _parse_mating(text: str, moved: str, parts: dict[str, Part]) -> MatingPose:
 def goal_poses(
     destination: Destination, moved: str, parts: dict[str, Part], instances: tuple[PlacedPart, ...]
 ) -> list[tuple[str, NDArray]]:
-    """(what it is, T_world_part) for each way to read the destination among the located instances; empty if none is there."""
+    """(what it is, T_world_part) for each way to read the destination among the located instances; empty if none is there, and for an
+    area, where it depends on the scene what is free (see `areas`)."""
+    if isinstance(destination, Area):
+        return []
     if isinstance(destination, FixedPose):
         return [(format_pose(destination.T_world_part), destination.T_world_part)]
     mate = parts[base_name(destination.part)].mates[destination.pose]

@@ -10,8 +10,9 @@ import numpy as np
 
 from handey_studio.base import Entry, Ledger, Progress, Silent, describe
 from handey_studio.base.errors import unknown_name
+from handey_studio.task.areas import area_poses
 from handey_studio.task.carrying import Start
-from handey_studio.task.destination import base_name, goal_poses, parse_destination
+from handey_studio.task.destination import Area, base_name, goal_poses, parse_destination
 from handey_studio.task.options import Goal, check_goal
 from handey_studio.task.plan import MoveCommand, MovePlan, MoveResult
 from handey_studio.task.search import OptionSearch, SearchOptions, settle
@@ -90,7 +91,9 @@ def _goals(world: World, command: MoveCommand, parts: dict[str, Part], ledger: L
     destination = parse_destination(command.to, command.part, parts)
     found = []
     for placed in _candidates(world, command.part):
-        for label, T_world_goal in goal_poses(destination, placed.name, parts, world.parts):
+        area = isinstance(destination, Area)
+        poses = area_poses(world, placed, destination, ledger) if area else goal_poses(destination, placed.name, parts, world.parts)
+        for label, T_world_goal in poses:
             goal = check_goal(world, placed, label, T_world_goal, ledger)
             if goal is not None:
                 found.append(goal)

@@ -16,7 +16,7 @@ StepKind = Literal["free", "approach", "close", "lift", "transfer", "regrasp", "
 @dataclass(frozen=True)
 class MoveCommand:
     """MOVE `part` TO `to`. `part` is a part's name or an instance (`l_block#2`); `to` a destination as it was typed:
-    `x,y,z[,roll,pitch,yaw]` (metres, degrees) or `on:PART[:POSE]`."""
+    `x,y,z[,roll,pitch,yaw]` (metres, degrees), `on:PART[:POSE]` or `in:x0,y0,x1,y1`."""
 
     part: str
     to: str
