@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
-from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy
+from handey_studio.geometry.transforms import apply, from_xyz_rpy, to_xyz_rpy
 from handey_studio.session.session import Session
 from handey_studio.task.destination import base_name, goal_poses, parse_destination
 from handey_studio.task.plan import MoveCommand
@@ -40,6 +40,14 @@ def moved_part(session: Session, command: MoveCommand) -> PlacedPart | None:
 def destinations_on_parts(session: Session, part: Part) -> tuple[str, ...]:
     """The `on:PART:POSE` destinations that the mating poses in this workcell offer a part."""
     return tuple(f"on:{other.name}:{name}" for other in session.parts for name, mate in other.mates.items() if mate.part == part.name)
+
+
+def anywhere(session: Session) -> str:
+    """The destination `in:x0,y0,x1,y1` that is the whole scanned area, seen along the table's axes."""
+    finder = session.workcell.finder
+    corners = apply(finder.T_world_range, [(x, y, 0.0) for x in (0.0, finder.area[0]) for y in (0.0, finder.area[1])])
+    (x0, y0), (x1, y1) = corners[:, :2].min(axis=0) + 0.0, corners[:, :2].max(axis=0) + 0.0
+    return f"in:{x0:.3f},{y0:.3f},{x1:.3f},{y1:.3f}"
 
 
 def snapped(part: Part, T_world_part: NDArray, table_z: float) -> NDArray:

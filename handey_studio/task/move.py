@@ -109,10 +109,11 @@ def _goal_reason(world: World, command: MoveCommand, ledger: Ledger) -> str:
     located = ", ".join(placed.name for placed in world.parts) or "nothing"
     if not _candidates(world, command.part):
         return f'"{command.part}" was not found in the scan; found: {located}'
-    fallen = [entry for entry in ledger.entries if entry.reason]
+    fallen = [entry for entry in ledger.entries if entry.reason and entry.stage in ("destination", "area")]
     if not fallen:
         return f'nothing to put it on: "{command.to}" needs another part than the one that moves; found: {located}'
-    return describe(fallen[0])
+    others = f"; {len(fallen) - 1} other readings of the command fell too" if len(fallen) > 1 else ""
+    return describe(fallen[0]) + others
 
 
 def _why_none(entries: tuple[Entry, ...]) -> str:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import from_xyz_rpy, pose_difference
-from handey_studio.task.destination import FixedPose, MatingPose, format_pose, goal_poses, parse_destination
+from handey_studio.task.destination import Area, FixedPose, MatingPose, format_pose, goal_poses, parse_destination
 from handey_studio.world import Library, PlacedPart
 
 PARTS = {name: Library.choose().part(name) for name in ("l_block", "brick")}
@@ -60,3 +60,14 @@ def test_what_is_not_a_destination_is_told_in_a_sentence(text, says):
     with pytest.raises(BadInput, match=says) as caught:
         parse_destination(text, "l_block", PARTS)
     assert "\n" not in str(caught.value)
+
+
+def test_an_area_is_a_rectangle_whichever_corners_are_given():
+    assert parse_destination("in:0.6,-0.2,0.3,0.1", "l_block", PARTS) == Area((0.3, -0.2), (0.6, 0.1))
+
+
+@pytest.mark.parametrize("text", ["in:", "in:1,2,3", "in:a,b,c,d", "in:0,0,0,1", "in:0,0,nan,1", "in:0,0,600,400"])
+def test_what_is_no_area_is_refused_in_one_sentence(text):
+    with pytest.raises(BadInput, match="area") as refused:
+        parse_destination(text, "l_block", PARTS)
+    assert "\n" not in str(refused.value)

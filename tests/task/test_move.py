@@ -142,6 +142,17 @@ def test_a_move_that_turns_the_part_over_puts_it_down_on_the_way(figure1):
     assert metres < 0.003 and radians < np.deg2rad(1.0)
 
 
+def test_any_of_the_parts_goes_anywhere_in_an_area(figure1):
+    result = figure1.plan("in:0.3,0.25,0.6,0.45")
+    assert result.status == "planned", result.reason
+    x, y = result.plan.T_world_part_goal[:2, 3]
+    assert 0.2 < x < 0.7 and 0.15 < y < 0.55
+    located = {placed.name: placed.T_world_part for placed in figure1.scene.instances}
+    assert check_plan(result.plan.steps, figure1.truth, figure1.station.robot, names_in_plan(figure1.truth, located)).ok
+    nowhere = figure1.plan("in:0.47,0.12,0.49,0.14")
+    assert nowhere.status == "failed" and "no free place" in nowhere.reason
+
+
 def test_a_limit_on_the_effort_is_in_the_ledger(figure1):
     cell = figure1.cell
     to = MoveCommand("l_block", "0.45,0.33,0,90,0,0")

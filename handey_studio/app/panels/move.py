@@ -13,8 +13,9 @@ from handey_studio.app.scene.destination import ghost_pose
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
 from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy
-from handey_studio.session.destination import destinations_on_parts
+from handey_studio.session.destination import anywhere, destinations_on_parts
 from handey_studio.task.destination import format_pose
+from handey_studio.task.plan import MoveCommand
 
 NO_PART = "–"
 KEYS = (
@@ -82,9 +83,10 @@ class MovePanel:
         choose(self._part, names, command.part if command and command.part in names else names[0], busy)
         part = session.part(command.part) if command else None
         mates = destinations_on_parts(session, part) if part else ()
-        free = command is None or not command.to.startswith("on:")
-        extra = () if free or command is None or command.to in mates else (command.to,)
-        choose(self._to, (*mates, *extra, POSE_LABEL), POSE_LABEL if free or command is None else command.to, busy or part is None)
+        free = command is None or not command.to.startswith(("on:", "in:"))
+        offered = (*mates, anywhere(session))
+        extra = () if free or command is None or command.to in offered else (command.to,)
+        choose(self._to, (*offered, *extra, POSE_LABEL), POSE_LABEL if free or command is None else command.to, busy or part is None)
         pose = ghost_pose(state)
         set_to(self._xyz, visible=free and pose is not None, disabled=busy)
         set_to(self._rpy, visible=free and pose is not None, disabled=busy)
@@ -92,7 +94,7 @@ class MovePanel:
             xyz, rpy = to_xyz_rpy(pose)
             set_to(self._xyz, value=rounded(1e3 * xyz, 2))
             set_to(self._rpy, value=rounded(np.rad2deg(rpy), 2))
-        set_to(self._why, content=_about_destination(free, pose is not None), visible=not free)
+        set_to(self._why, content=_about_destination(free, pose is not None, command), visible=not free)
         set_to(self._seed, value=session.seed, disabled=busy)
         robots = tuple(sorted({*state.library.robot_folders(), session.workcell.robot}))
         choose(self._robot, robots, session.workcell.robot, busy)
@@ -124,10 +126,12 @@ def rounded(values: Any, digits: int) -> tuple[float, ...]:
     return tuple(float(round(float(value), digits)) + 0.0 for value in values)
 
 
-def _about_destination(free: bool, known: bool) -> str:
-    if free:
+def _about_destination(free: bool, known: bool, command: MoveCommand | None) -> str:
+    if free or command is None:
         return ""
     text = "It goes where it fits onto that part." if known else "The ghost appears once that part is located."
+    if command.to.startswith("in:"):
+        text = "It goes to a free place in this area of the table (x and y from, x and y to, in metres), standing as it may."
     return f'<div style="margin:0 14px 4px;font-size:12px;color:#6b7684">{html.esc(text)}</div>'
 
 
