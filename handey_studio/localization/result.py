@@ -17,7 +17,7 @@ class LocateOptions:
     height [m] below which no part can be (None: no such plane)."""
 
     max_poses: int = 5
-    min_score: float = 0.28
+    min_score: float = 0.31
     min_visible_fraction: float = 0.1
     min_edge_m: float | None = None
     max_data_edges: int = 600
