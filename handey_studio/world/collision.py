@@ -1,19 +1,17 @@
 """Exact collision of the arm, the hand and what it holds with the world: distances, and depths where bodies overlap.
 
-Distances come from compiled queries whose answers never exceed the truth (see `gjk`), depths from FCL. All bodies are
-convex: links' hulls, the hand's boxes, parts' exact convex pieces, the depth map's columns.
+Distances come from compiled queries whose answers never exceed the truth (see `gjk`), depths from separating axes (see `overlap`). All
+bodies are convex: links' hulls, the hand's boxes, parts' exact convex pieces, the depth map's columns.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-import fcl
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.geometry import hull_triangles
 from handey_studio.geometry.transforms import inverse
 from handey_studio.world.arm import arm_of
 from handey_studio.world.collision_bodies import (
@@ -39,7 +37,7 @@ from handey_studio.world.collision_queries import (
     least_clearance,
     placed,
 )
-from handey_studio.world.column_depth import Directions, column_depths, directions_of
+from handey_studio.world.overlap import Directions, column_depths, depth, directions_of
 from handey_studio.world.part import Held
 from handey_studio.world.robot import Robot
 from handey_studio.world.world import World
@@ -90,7 +88,6 @@ class Bodies:
 
     shapes: Shapes
     names: tuple[str, ...]
-    _convex: dict[int, fcl.Convex] = field(default_factory=dict)
 
     def place(self, poses: NDArray, opening: float) -> Placing:
         return Placing(poses, opening, placed(self.shapes, poses, float(opening)))
@@ -98,14 +95,6 @@ class Bodies:
     def directions(self, b: int) -> Directions:
         """Face normals and edges of body b in its link's frame."""
         return directions_of(self.shapes.corners[self.shapes.first[b] : self.shapes.first[b + 1]])
-
-    def fcl_object(self, b: int, placing: Placing) -> fcl.CollisionObject:
-        """Body b where it is."""
-        shapes = self.shapes
-        if b not in self._convex:
-            self._convex[b] = fcl_convex(shapes.corners[shapes.first[b] : shapes.first[b + 1]])
-        T = placing.poses[shapes.link[b]]
-        return fcl.CollisionObject(self._convex[b], fcl.Transform(T[:3, :3], T[:3, :3] @ shapes.slide[b] * placing.opening + T[:3, 3]))
 
 
 class CollisionModel:
@@ -128,7 +117,6 @@ class CollisionModel:
         self.solids = obstacles_of(solids, self._numbers)
         self.terrain = terrain_obstacles(world.terrain, world.table_z, float(world.free_space[1, 2]))
         self._bodies: dict[tuple[Held | None, bool], Bodies] = {}
-        self._fixed: dict[int, fcl.Convex] = {}
         self._scenes: dict[tuple[str, frozenset[frozenset[str]]], Scene] = {}
 
     def clearance(self, q: NDArray, opening: float, held: Held | None = None, allowed: Pairs = (), limit: float = FAR_M) -> Clearance:
@@ -216,24 +204,24 @@ class CollisionModel:
 
     def _in_columns(self, b: int, others: NDArray, bodies: Bodies, placing: Placing) -> NDArray:
         """How deep [m] body b stands in each of the columns that it meets: many of them tell how deep a wide body stands."""
-        R = placing.poses[bodies.shapes.link[b], :3, :3]
+        R = self._turn(b, bodies, placing)
         return column_depths(self._moving(b, bodies, placing), bodies.directions(b), R, self.terrain.corners.reshape(-1, 8, 3)[others])
 
     def _depth(self, hit: Hit, bodies: Bodies, placing: Placing) -> float:
         """How deep [m] two bodies overlap."""
         if hit.kind == 1:
             return float(self._in_columns(hit.body, np.array([hit.other]), bodies, placing)[0])
-        mine = self._moving(hit.body, bodies, placing)
+        mine = self._moving(hit.body, bodies, placing), bodies.directions(hit.body), self._turn(hit.body, bodies, placing)
         if hit.kind == 2:
-            theirs = self._moving(hit.other, bodies, placing)
-            return penetration(bodies.fcl_object(hit.body, placing), bodies.fcl_object(hit.other, placing), least_side(mine, theirs))
+            return depth(
+                *mine, self._moving(hit.other, bodies, placing), bodies.directions(hit.other), self._turn(hit.other, bodies, placing)
+            )
         corners = self.solids.corners[self.solids.first[hit.other] : self.solids.first[hit.other + 1]]
-        most = least_side(mine, corners)
-        if most <= ALLOWED_DEPTH_M:  # so little that the exact depth would change nothing
-            return most
-        if hit.other not in self._fixed:
-            self._fixed[hit.other] = fcl_convex(corners)
-        return penetration(bodies.fcl_object(hit.body, placing), fcl.CollisionObject(self._fixed[hit.other]), most)
+        return depth(*mine, corners, directions_of(corners), np.eye(3))
+
+    @staticmethod
+    def _turn(b: int, bodies: Bodies, placing: Placing) -> NDArray:
+        return placing.poses[bodies.shapes.link[b], :3, :3]
 
     @staticmethod
     def _moving(b: int, bodies: Bodies, placing: Placing) -> NDArray:
@@ -244,29 +232,6 @@ class CollisionModel:
 def collision_model(world: World) -> CollisionModel:
     """The collision model of a world, built on first use and kept warm in this process."""
     return CollisionModel(world)
-
-
-def penetration(one: fcl.CollisionObject, other: fcl.CollisionObject, most: float = np.inf) -> float:
-    """Depth [m] that two convex bodies overlap by: the least shift that parts them, as FCL finds it; 0 when apart.
-
-    `most` is a depth known to suffice (see `least_side`): FCL's own number is far too large where faces just touch.
-    """
-    request, result = fcl.DistanceRequest(enable_signed_distance=True), fcl.DistanceResult()
-    return float(np.clip(-fcl.distance(one, other, request, result), 0.0, most))
-
-
-def least_side(one: NDArray, other: NDArray) -> float:
-    """The shift [m] along x, y or z that surely parts two bodies of corners (k, 3): the least overlap of their bounding boxes."""
-    low, high = np.maximum(one.min(axis=0), other.min(axis=0)), np.minimum(one.max(axis=0), other.max(axis=0))
-    along = np.minimum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0))
-    return float(max(along.min(), 0.0)) if (high >= low).all() else 0.0
-
-
-def fcl_convex(corners: NDArray) -> fcl.Convex:
-    """FCL's convex body of corners (k, 3) [m]: its faces are outward loops, each led by its number of corners."""
-    triangles = hull_triangles(corners)
-    faces = np.concatenate([np.full((len(triangles), 1), 3), triangles], axis=1).reshape(-1)
-    return fcl.Convex(np.array(corners), len(triangles), faces)
 
 
 @lru_cache(maxsize=8)

@@ -3,16 +3,14 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
-import fcl
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry import HeightField
 from handey_studio.geometry.transforms import apply
-from handey_studio.world.collision import fcl_convex, least_side, penetration
 from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, solids_of, terrain_obstacles
-from handey_studio.world.column_depth import column_depths, column_distances, directions_of
 from handey_studio.world.gjk import distance
+from handey_studio.world.overlap import column_depths, column_distances, depth, directions_of
 from handey_studio.world.part import PlacedPart
 from handey_studio.world.world import World
 
@@ -78,4 +76,4 @@ def _gap(piece: NDArray, corners: NDArray, within: float) -> float:
     apart = distance(piece, 0, len(piece), corners, 0, len(corners), within + 1e-9)
     if apart > 0:
         return float(apart)
-    return -penetration(fcl.CollisionObject(fcl_convex(piece)), fcl.CollisionObject(fcl_convex(corners)), least_side(piece, corners))
+    return -depth(piece, directions_of(piece), np.eye(3), corners, directions_of(corners), np.eye(3))

@@ -1,4 +1,4 @@
-"""How deep convex bodies stand in the depth map's columns: separating axes, all columns at once.
+"""How deep convex bodies overlap, and stand in the depth map's columns, all columns at once: separating axes.
 
 The least shift that parts two convex polytopes is along a face normal of either or a cross product of their edges (Gottschalk, Lin &
 Manocha 1996, OBBTree); leaving out one of these makes the answer larger, never smaller.
@@ -45,6 +45,18 @@ def _unlike(vectors: NDArray) -> NDArray:
     first = np.argmax(np.abs(units) > SAME, axis=1)
     units = units * np.sign(units[np.arange(len(units)), first])[:, None]
     return units[np.unique(np.round(units / SAME).astype(np.int64), axis=0, return_index=True)[1]]
+
+
+def depth(a: NDArray, of_a: Directions, R_a: NDArray, b: NDArray, of_b: Directions, R_b: NDArray) -> float:
+    """Depth [m] that two bodies of corners (n, 3) and (m, 3) overlap by: the least shift that parts them; 0 when they are apart.
+
+    `R_a`, `R_b` (3, 3) turn each one's own directions into the world.
+    """
+    crosses = np.cross((of_a.edges @ R_a.T)[:, None], (of_b.edges @ R_b.T)[None]).reshape(-1, 3)
+    size = np.linalg.norm(crosses, axis=1)
+    along = np.concatenate([of_a.normals @ R_a.T, of_b.normals @ R_b.T, crosses[size > 1e-6] / size[size > 1e-6, None]]).T
+    one, other = a @ along, b @ along
+    return max(0.0, float(np.minimum(one.max(axis=0) - other.min(axis=0), other.max(axis=0) - one.min(axis=0)).min()))
 
 
 def column_depths(body: NDArray, directions: Directions, R: NDArray, columns: NDArray) -> NDArray:
