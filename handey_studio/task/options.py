@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Value, frozen_array
-from handey_studio.geometry.transforms import from_xyz_rpy, inverse
-from handey_studio.grasping import GraspEnd, GraspGroup, angle_range, grasp_groups, opening_around
+from handey_studio.geometry.transforms import from_xyz_rpy
+from handey_studio.grasping import GraspEnd, GraspGroup, grasp_groups, opening_around, rank_terms
 from handey_studio.world import PlacedPart, World
 from handey_studio.world.collision import ALLOWED_DEPTH_M
 from handey_studio.world.support import MAX_GAP_M, TOUCHING_M, Neighbour, neighbours
@@ -19,8 +19,6 @@ from handey_studio.world.support import MAX_GAP_M, TOUCHING_M, Neighbour, neighb
 Pairs = tuple[tuple[str, str], ...]
 
 CLIMB_M = (0.004, 0.012, 0.03, 0.06)  # the part alone must be free at these heights above both its places
-
-OFF_CENTRE_COST = 4.0  # [rad/m]: a grasp 10 cm off the centre of mass ranks like one tilted by 0.4 rad more
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,23 +120,12 @@ def _in_the_way(near: tuple[Neighbour, ...], what: str, name: str, entry: int, l
 
 
 def options_of(goal: Goal, ledger: Ledger) -> list[Option]:
-    """Every option of a goal, with what it costs [rad]: the fingers' tilt over both ends, and how far from the centre of mass they grip."""
+    """Every option of a goal, with what it costs [rad of tilt] by its geometry alone."""
     part, hand = goal.instance.part, goal.at_start.robot.hand
     groups, entries = grasp_groups(part, hand)
     ledger.adopt(entries, parent=goal.entry)
     options = []
     for symmetry in range(len(part.symmetries)):
-        T_start = goal.instance.T_world_part @ part.symmetries[symmetry]
-        for group in groups:
-            options.append(Option(goal, symmetry, group, _cost(group, part.solid.volume_and_centroid[1], T_start, goal.T_world_goal)))
+        ends = GraspEnd(goal.at_start, goal.instance.T_world_part @ part.symmetries[symmetry]), GraspEnd(goal.at_goal, goal.T_world_goal)
+        options += [Option(goal, symmetry, group, rank_terms(group, *ends).cost) for group in groups]
     return options
-
-
-def _cost(group: GraspGroup, centroid: NDArray, T_world_start: NDArray, T_world_goal: NDArray) -> float:
-    """Least sum of the fingers' tilts [rad] at both ends over the group's angles, and a share for gripping off the centre of mass."""
-    T_part_plane = group.grasp_class.T_part_plane
-    angles = angle_range(group)
-    directions = np.stack([np.zeros_like(angles), np.cos(angles), np.sin(angles)], axis=1) @ T_part_plane[:3, :3].T
-    tilts = [np.arccos(np.clip(-directions @ T[2, :3], -1, 1)) for T in (T_world_start, T_world_goal)]
-    centre = (inverse(T_part_plane)[:3] @ np.append(centroid, 1.0))[1:]
-    return float((tilts[0] + tilts[1]).min() + OFF_CENTRE_COST * np.linalg.norm(group.point - centre))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Share
-from handey_studio.grasping import GraspPlane, LegalRotations, legal_rotations
+from handey_studio.grasping import GraspPlane, LegalRotations, legal_rotations, rank_terms
 from handey_studio.task.carrying import Carried, Kept, Start, join, worst
 from handey_studio.task.detours import detours
 from handey_studio.task.ends import PICKUP, PUTDOWN, End, pickup_end, putdown_end, reachable
@@ -156,10 +156,9 @@ class OptionSearch:
         if not rotations.legal:
             fall_illegal(option, rotations, entry, self.ledger)
             return
-        best = rotations.best(ANGLES)
-        for angle in best:
-            extra = _tilt_at(rotations, angle) - _tilt_at(rotations, best[0])
-            self._push(Node(APPROACH, node.route, (option, rotations, angle), node.cost + extra, entry))
+        for angle in rotations.best(ANGLES):
+            cost = node.cost - option.cost + rank_terms(option.group, option.pickup, option.putdown, rotations, angle).cost
+            self._push(Node(APPROACH, node.route, (option, rotations, angle), cost, entry))
 
     def _approach(self, node: Node) -> None:
         option, rotations, angle = node.what
@@ -243,10 +242,6 @@ TESTS: dict[int, Callable[[OptionSearch, Node], MovePlan | None]] = {
 def _pickup_of(option: Option) -> tuple:
     """What everything at the pickup depends on: wherever the part goes from here, it is the same."""
     return option.goal.at_start, option.T_world_start.tobytes(), option.group
-
-
-def _tilt_at(rotations: LegalRotations, angle: float) -> float:
-    return float(rotations.tilts(np.array([angle])).sum())
 
 
 def _joint_key(node: Node) -> NDArray:

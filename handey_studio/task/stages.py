@@ -17,7 +17,7 @@ class Stage(NamedTuple):
 DETOUR, ROTATIONS, APPROACH, REACH, STRAIGHT, PATHS = range(6)
 STAGES = (
     Stage("detour", 0.200, 0.9),
-    Stage("legal rotations", 0.010, 0.4),
+    Stage("legal rotations", 0.002, 0.4),
     Stage("approach", 0.030, 0.6),
     Stage("reach", 0.010, 0.7),
     Stage("straight motions", 0.080, 0.6),

@@ -156,11 +156,11 @@ def test_any_of_the_parts_goes_anywhere_in_an_area(figure1):
 def test_a_limit_on_the_effort_is_in_the_ledger(figure1):
     cell = figure1.cell
     to = MoveCommand("l_block", "0.45,0.33,0,90,0,0")
-    options = MoveOptions(search=SearchOptions(effort=0.005))
+    options = MoveOptions(search=SearchOptions(effort=0.001))
     result = plan_in(figure1.station, figure1.scene, to, cell.joints(), cell.opening(), options)
     (cut,) = [entry for entry in result.ledger if entry.stage == "options"]
     assert result.status == "failed" and cut.reason == "not looked at: the effort is spent"
-    assert int(cut.option.split()[0]) > 100 and cut.value >= cut.limit == 0.005
+    assert int(cut.option.split()[0]) > 100 and cut.value >= cut.limit == 0.001
     assert sum(entry.stage == "grasp group" for entry in result.ledger) == 1
 
 
