@@ -44,6 +44,7 @@ FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and fro
 AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.853  # edges times readings that agree: how fast odds grow, and where they are even
 EDGES_WORTH, EVEN_EDGES = 4.0, 6.0  # more edges that are found say more
 OFF_COST, SUNK_COST = 4.0, 2.0  # a sigma that the readings' rms is too large; a slack too far below the table
+TAIL = 0.003  # of the readings on a right pose's faces seem to see through it all the same: a sensor's noise has tails
 TOUCHES = 2.0  # standard deviations of a corner's height, and of a reading, from the table
 
 
@@ -119,10 +120,11 @@ def _of_edges(search: Search, part: Part, rated: Rated) -> NDArray:
 def _of_readings(part: Part, rated: Rated) -> NDArray:
     tally, square = rated.tally, part.solid.diameter**2
     every = np.maximum(sum(tally), 1e-12)
+    through = np.maximum(tally.through - TAIL * tally.on, 0.0)
     return np.stack(
         [
-            np.log1p(1e4 * tally.through / square),
-            np.sqrt(tally.through / square),
+            np.log1p(1e4 * through / square),
+            np.sqrt(through / square),
             np.sqrt(np.minimum(tally.before / np.maximum(tally.on + tally.before, 1e-12), 0.25)),
             np.log(np.maximum(tally.on / square, 1e-6)),
             np.sqrt(tally.hidden / every),
