@@ -86,6 +86,24 @@ def hidden(elements: Iterable[str]) -> str:
     return f"<style>{rules} {{ display: none }}</style>" if rules else ""
 
 
+def unseen(elements: Iterable[str]) -> str:
+    """Takes fields (elements' ids) off the page, with their labels, that only clicks into pictures fill."""
+    rules = ", ".join(f'div:has(> .mantine-Flex-root [id="{esc(element)}"])' for element in elements if element)
+    return f"<style>{rules} {{ display: none }}</style>" if rules else ""
+
+
+def picking(element: str, number: str) -> str:
+    """Script of a picture that puts a number (an expression) into a number field (an element's id) as if it were typed."""
+    typed = "Object.getOwnPropertyDescriptor(HTMLInputElement.prototype,'value').set.call"
+    told = "i.dispatchEvent(new Event('input',{bubbles:true}))"
+    return f"const i=document.getElementById('{element}');{typed}(i,String({number}));{told}"
+
+
+def heading(text: str) -> str:
+    """The heading of a section."""
+    return f'<div style="font-weight:650;font-size:12.5px;margin:8px 14px 2px">{esc(text)}</div>'
+
+
 def pressing(element: str) -> str:
     """Script of a row that presses a button (an element's id)."""
     return f"document.getElementById('{element}').click()"

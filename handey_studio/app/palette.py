@@ -32,6 +32,11 @@ CONVEX: RGB = INK
 CONCAVE: RGB = (150, 92, 16)
 FOUND, MISSING, HIDDEN = TEAL, VERMILLION, (150, 158, 168)  # predicted edges
 
+EDGE: RGB = (128, 76, 14)  # edges of a part in a picture
+PICKUP, PUTDOWN, OWN = (196, 128, 40), (120, 94, 180), VERMILLION  # what forbids a hand angle: obstacles at either end, the part itself
+SHORT: RGB = (150, 158, 168)  # too little contact
+BEYOND: RGB = (70, 96, 142)  # out of the arm's reach
+
 STEP_COLOURS: dict[str, RGB] = {
     "free": (122, 134, 148),
     "approach": TEAL,

@@ -4,10 +4,12 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
+from handey_studio.app.grasp_look import GraspLook
 from handey_studio.base import Entry
 from handey_studio.localization import Hypothesis
 from handey_studio.localization.explain import Explanation
 from handey_studio.session import Replay, Session
+from handey_studio.session.handling import Handling
 from handey_studio.session.ledger_tree import ROOT
 from handey_studio.task.plan import Carry, MoveCommand
 from handey_studio.task.sense import Scene
@@ -79,6 +81,14 @@ class Explained:
 
 
 @dataclass(frozen=True, eq=False)
+class Handled:
+    """What the hand can do with a part, worked out for these arguments of `session.handling.handling`; None when that failed."""
+
+    asked: tuple
+    handling: Handling | None
+
+
+@dataclass(frozen=True, eq=False)
 class State:
     """Everything that the screen shows. `saved` is the session as it is on disk at `path`.
 
@@ -110,6 +120,8 @@ class State:
     hypothesis_verdict: str = ""
     edge_min_m: float = 0.0
     explained: Explained | None = None
+    handled: Handled | None = None
+    grasp_look: GraspLook = field(default_factory=GraspLook)
     loads: int = field(default=0)
 
     @property
@@ -145,6 +157,21 @@ class State:
         """The entry of the ledger that is looked at."""
         ledger = self.session.result.ledger if self.session.result else ()
         return ledger[self.ledger_entry] if 0 <= self.ledger_entry < len(ledger) else None
+
+    @property
+    def to_handle(self) -> tuple | None:
+        """What it is to be worked out for how the hand can grasp it: the MOVE that is looked at, or the part that is chosen."""
+        session = self.session
+        command = session.result.command if session.result is not None else self.command
+        part = session.part(command.part) if command is not None else None
+        if part is None or command is None:
+            return None
+        return part, command.part, self.robot, session.workcell, session.scene, session.result
+
+    @property
+    def handling(self) -> Handling | None:
+        """What the hand can do with that, None while it is being worked out."""
+        return self.handled.handling if self.handled is not None and same(self.to_handle, self.handled.asked) else None
 
     @property
     def unsaved(self) -> bool:
@@ -205,6 +232,13 @@ def redone(state: State) -> State:
 def with_view(state: State, **changes) -> State:
     """The state with its view changed."""
     return replace(state, session=replace(state.session, view=replace(state.session.view, **changes)))
+
+
+def same(one: tuple | None, other: tuple | None) -> bool:
+    """Whether two questions ask for the same: numbers and words by value, all else by identity."""
+    if one is None or other is None or len(one) != len(other):
+        return False
+    return all(a is b or (isinstance(a, int | str) and a == b) for a, b in zip(one, other, strict=True))
 
 
 @lru_cache(maxsize=4)

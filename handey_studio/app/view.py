@@ -6,7 +6,8 @@ import viser
 
 from handey_studio.app import palette
 from handey_studio.app.panels.edges import EdgesPanel
-from handey_studio.app.panels.findings import GraspPanel, PathPanel, ResultPanel
+from handey_studio.app.panels.findings import PathPanel, ResultPanel
+from handey_studio.app.panels.grasp import GraspPanel
 from handey_studio.app.panels.ledger import LedgerPanel
 from handey_studio.app.panels.looking import LookingPanel
 from handey_studio.app.panels.move import MovePanel
@@ -18,6 +19,7 @@ from handey_studio.app.scene.depth import DepthScene
 from handey_studio.app.scene.destination import DestinationScene
 from handey_studio.app.scene.failure import FailureScene
 from handey_studio.app.scene.findings import PlanScene
+from handey_studio.app.scene.grasp import GraspScene, StandingScene
 from handey_studio.app.scene.hypothesis import HypothesisScene
 from handey_studio.app.scene.pair import PairScene
 from handey_studio.app.scene.parts import PartsScene
@@ -47,7 +49,8 @@ class View:
         server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
         scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server, send)]
         scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), HypothesisScene(server)]
-        scenes += [PairScene(server), PlanScene(server), CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
+        scenes += [PairScene(server), PlanScene(server), GraspScene(server), StandingScene(server)]
+        scenes += [CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
         session = SessionPanel(server, send)
         self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()
@@ -80,7 +83,7 @@ def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
     with tabs.add_tab("Located"):
         located = SensingPanel(gui, send)
     with tabs.add_tab("Grasp"):
-        grasp = GraspPanel(gui)
+        grasp = GraspPanel(gui, send)
     with tabs.add_tab("Path"):
         path = PathPanel(gui)
     with tabs.add_tab("Ledger"):

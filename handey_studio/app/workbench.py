@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from handey_studio.app.commands import CameraMoved, Tell, Viewers
 from handey_studio.app.explaining import Explainer
+from handey_studio.app.handling import Handler
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows
 from handey_studio.app.palette import BLUE, TEAL, VERMILLION
 from handey_studio.app.planner import Failed, Finished, Planner, Progressed, Run, Shown
@@ -47,11 +48,11 @@ class Workbench:
         self._running = threading.Event()
         self._running.set()
         self.planner = Planner(run, lambda message: self.send(heard(message)), prepare)
-        self._explainer = Explainer(self.send)
+        self._background = (Explainer(self.send), Handler(self.send))
         self._view = View(server, self.send)
         self._start_from(session.view.camera_position, session.view.camera_look_at)
         self._view.render(None, self.state)
-        self._explainer.follow(self.state)
+        self._follow()
         server.on_client_connect(self._arrived)
         server.on_client_disconnect(lambda _: self.send(Viewers(-1)))
         self._thread = threading.Thread(target=self._loop, name="workbench", daemon=True)
@@ -65,7 +66,8 @@ class Workbench:
         self._running.clear()
         self._commands.put(None)
         self._thread.join(timeout=10)
-        self._explainer.stop()
+        for worker in self._background:
+            worker.stop()
         self.planner.stop()
         self.server.stop()
 
@@ -120,7 +122,7 @@ class Workbench:
         for command in commands:
             self.state = self._next(command)
         self._view.render(old, self.state)
-        self._explainer.follow(self.state)
+        self._follow()
         self._notify(old)
 
     def _next(self, command: Any) -> State:
@@ -128,6 +130,11 @@ class Workbench:
             return command.run(self) if hasattr(command, "run") else command.apply(self.state)
         except BadInput as error:
             return self.state.told(str(error), "bad")
+
+    def _follow(self) -> None:
+        """What the state wants worked out is worked out in the background."""
+        for worker in self._background:
+            worker.follow(self.state)
 
     def _notify(self, old: State) -> None:
         known = old.notices[-1].number if old.notices else -1

@@ -224,6 +224,7 @@ def _choice(
         contact_area=approach.area,
         joint_margin=0.0,
         grip=grip,
+        forbidden=rotations.forbidden,
     )
 
 

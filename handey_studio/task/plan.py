@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Entry, Value, frozen_array
-from handey_studio.grasping import BumpRun, Grip
+from handey_studio.grasping import BumpRun, ForbiddenRange, Grip
 from handey_studio.motion import Certificate, CSpaceSummary
 
 StepKind = Literal["free", "approach", "close", "lift", "transfer", "regrasp", "place", "open", "retreat"]
@@ -54,7 +54,8 @@ class GraspChoice(Value):
     `T_hand_part` (4, 4) is the grasp itself. `faces` are the grasped faces, `edge_part` (2, 3) [m] the edge that is crossed first, both
     of the part; `contact_part` (k, 3) [m] the outline of where the faces face each other, in the grasp plane. `angle` and the
     legal `ranges` (m, 2) [rad] are hand angles in the grasp plane. `tilts` [rad] of the fingers from straight down at pickup and putdown.
-    `grip` is how well it holds the part at the worst turn of the whole carry; None in plans of earlier versions.
+    `grip` is how well it holds the part at the worst turn of the whole carry, `forbidden` the hand angles that were not legal and what
+    forbade them, at both ends; None and empty in plans of earlier versions.
     """
 
     name: str
@@ -72,6 +73,7 @@ class GraspChoice(Value):
     contact_area: float
     joint_margin: float
     grip: Grip | None = None
+    forbidden: tuple[ForbiddenRange, ...] = ()
 
     def __post_init__(self) -> None:
         for key in ("T_hand_part", "T_part_plane", "edge_part", "contact_part", "ranges"):

@@ -1,4 +1,4 @@
-"""What was found: the result in numbers, the grasp with its plane, the path with its certificate."""
+"""What was found: the result in numbers, the path with its certificate."""
 
 import numpy as np
 import viser
@@ -6,17 +6,14 @@ import viser
 from handey_studio.app import html, palette
 from handey_studio.app.cspace import slice_html
 from handey_studio.app.state import State
-from handey_studio.app.svg import grasp_plane_html
 from handey_studio.app.wire import set_to
 from handey_studio.geometry.transforms import pose_difference
-from handey_studio.grasping import Grip
 from handey_studio.task.carrying import TOLD_M
-from handey_studio.task.plan import GraspChoice, MovePlan, MoveResult
+from handey_studio.task.plan import MovePlan, MoveResult
 
 NO_RESULT = "No MOVE was tried yet. Set the part and its destination on the left, then press Plan or MOVE."
 NO_PATH = "No path yet. A plan shows here what was proved of it, and the arm's way through the configuration space."
 NO_SPACE = "This plan kept no picture of its configuration space."
-NO_GRASP = "No grasp yet. A plan shows here which faces are held, how the hand comes in, and what stood in its way."
 
 
 class ResultPanel:
@@ -30,22 +27,6 @@ class ResultPanel:
             return
         result = new.session.result
         self._pane.content = result_html(result) if result else html.empty(NO_RESULT, "result-empty")
-
-
-class GraspPanel:
-    """The grasp in words and numbers, and the picture of the grasp plane with the hand where the timeline has it."""
-
-    def __init__(self, gui: viser.GuiApi) -> None:
-        self._pane = gui.add_html("")
-
-    def render(self, old: State | None, new: State) -> None:
-        replay = new.replay
-        if replay is None:
-            set_to(self._pane, content=html.empty(NO_GRASP, "grasp-empty"))
-        elif old is None or _grasp_looks(old) != _grasp_looks(new):
-            carry = replay.carry_at(new.session.view.time_s)
-            picture = grasp_plane_html(carry.approach, new.robot.hand, approach_point(new))
-            self._pane.content = html.facts(grasp_facts(carry.grasp), "grasp") + picture
 
 
 class PathPanel:
@@ -79,19 +60,6 @@ def clearance_legend() -> str:
     return html.scale("Clearance along the path (mm)", stops, [f"{1e3 * TOLD_M * share:.0f}" for share in (0.0, 0.5, 1.0)])
 
 
-def approach_point(state: State) -> int:
-    """How far along the approach in the grasp plane the hand is: a number of a point of its path."""
-    replay = state.replay
-    if replay is None:
-        return 0
-    time_s = state.session.view.time_s
-    return round(replay.share_of("approach", time_s) * (len(replay.carry_at(time_s).approach.path) - 1))
-
-
-def _grasp_looks(state: State) -> tuple:
-    return state.carry, approach_point(state)
-
-
 def result_html(result: MoveResult) -> str:
     """Status, reason, poses, certificate, seconds."""
     tone = {"planned": "info", "done": "good", "failed": "bad"}[result.status]
@@ -105,7 +73,7 @@ def result_html(result: MoveResult) -> str:
         pane += html.facts([("Reached within", f"{1e3 * metres:.2f} mm, {np.rad2deg(radians):.2f}°")])
     timing = [(stage, f"{seconds:.2f} s") for stage, seconds in result.timing_s.items()]
     physics = "simulated with physics" if result.physics else "held part attached rigidly (no physics)"
-    return pane + _head("Seconds a stage") + html.facts([*timing, ("Execution", physics)], "timing")
+    return pane + html.heading("Seconds a stage") + html.facts([*timing, ("Execution", physics)], "timing")
 
 
 def plan_facts(plan: MovePlan) -> list[tuple[str, str]]:
@@ -123,31 +91,3 @@ def path_facts(plan: MovePlan) -> list[tuple[str, str]]:
         ("Closest", f"{html.millimetres(certificate.least_clearance, 1)} between {' and '.join(certificate.bodies) or 'nothing'}"),
         ("Exact checks", f"{certificate.checks}"),
     ]
-
-
-def grasp_facts(grasp: GraspChoice) -> list[tuple[str, str]]:
-    """The grasp as the paper speaks of it."""
-    ranges = ", ".join(f"{low:.0f}° to {high:.0f}°" for low, high in np.rad2deg(grasp.ranges).reshape(-1, 2))
-    return [
-        ("Grasp class", grasp.name),
-        ("Approach group", grasp.group),
-        ("Legal angles", ranges or "none"),
-        ("Chosen angle", f"{np.rad2deg(grasp.angle):.1f}°"),
-        ("Tilt", f"{np.rad2deg(grasp.tilts[0]):.0f}° at pickup, {np.rad2deg(grasp.tilts[1]):.0f}° at putdown"),
-        ("Fingers", f"{html.millimetres(grasp.width, 1)} held, {html.millimetres(grasp.opening)} open"),
-        ("Contact", f"{1e6 * grasp.contact_area:.0f} mm² each"),
-        *([("Grip", grip_words(grasp.grip))] if grasp.grip else []),
-        ("Joint limits", f"{np.rad2deg(grasp.joint_margin):.0f}° away"),
-    ]
-
-
-def grip_words(grip: Grip) -> str:
-    """How much more than its weight the fingers would hold of the part."""
-    return (
-        f"{grip.force_margin:.1f} N and {grip.torque_margin:.2f} N m to spare at the worst turn, where it {grip.limit} first; "
-        f"{grip.needed_force:.1f} N would just hold"
-    )
-
-
-def _head(text: str) -> str:
-    return f'<div style="font-weight:650;font-size:12.5px;margin:8px 14px 2px">{html.esc(text)}</div>'
