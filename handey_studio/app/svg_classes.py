@@ -55,7 +55,7 @@ def class_svg(part: Part, grasp_class: GraspClass, groups: Sequence[tuple[GraspG
     for group, fate in sorted(best.values(), key=lambda pair: -ORDER.index(pair[1])):
         along = np.array([np.cos(group.angle), np.sin(group.angle)])
         tail, tip = view.pixels(np.array([group.point - (group.depth + ARROW_M) * along, group.point]))
-        shapes.append(arrow(tail, tip, COLOURS[fate], 3.0 if fate == CHOSEN else 1.4))
+        shapes.append(arrow(tail, tip, COLOURS[fate], 3.0 if fate == CHOSEN else 1.2))
     return svg("class-picture", grasp_class.name, SIZE, SIZE, *shapes, style=BARE)
 
 
@@ -64,7 +64,7 @@ def _card(told: Handling, number: int, place: int, entries: Mapping[str, Entry],
     groups = [(told.groups[g], fate_of(told.groups[g], entries, chosen)) for g in numbers]
     T_world_plane = told.T_world_part @ grasp_class.T_part_plane
     middle = grasp_class.T_part_plane[:3, 1:3].T @ (told.part.solid.vertices.mean(axis=0) - grasp_class.T_part_plane[:3, 3])
-    view = PlaneView(T_world_plane, middle, 1.25 * told.part.solid.diameter + 2.0 * ARROW_M, SIZE)
+    view = PlaneView(T_world_plane, middle, told.part.solid.diameter + 1.6 * ARROW_M, SIZE)
     counts = {fate: sum(f == fate for _, f in groups) for fate in ORDER}
     said = ", ".join(f"{counts[fate]} {fate}" for fate in ORDER if counts[fate]) if entries else f"{len(groups)} approach groups"
     seen = "seen from above or below" if view.level else "up is up"
@@ -91,8 +91,8 @@ def _group_row(group: GraspGroup, entries: Mapping[str, Entry], chosen: str) -> 
     sign = {CHOSEN: "★", STOOD: "●", FELL: "✕", OPEN: "○"}[fate]
     name = group.name.removeprefix(group.grasp_class.name + ", ")
     why = describe(entries[group.name]) if fate == FELL else fate
-    mark = f'<span style="color:{css(COLOURS[fate])};display:inline-block;width:16px">{sign}</span>'
-    return f'<div style="padding:1px 0;border-bottom:1px solid #eef1f4">{mark}{html.esc(name)} <span style="color:#6b7684">{html.esc(why)}</span></div>'
+    mark = f'<span style="color:{css(COLOURS[fate])};display:inline-block;width:16px">{sign}</span>{html.esc(name)}'
+    return f'<div style="padding:1px 0;border-bottom:1px solid #eef1f4">{mark} <span style="color:#6b7684">{html.esc(why)}</span></div>'
 
 
 def _fallen(entries: Sequence[Entry]) -> str:

@@ -13,9 +13,10 @@ from handey_studio.grasping import ForbiddenRange
 from handey_studio.task.plan import GraspChoice
 from handey_studio.world import Hand, Part
 
-WIDTH, HEIGHT = 300.0, 250.0
+WIDTH, HEIGHT = 300.0, 236.0
 VIEW_M = 0.26
-LEGAL_RADIUS, RING, GAP = 118.0, 7.0, 1.5
+LEGAL_RADIUS, RING, GAP = 128.0, 8.0, 1.5
+ASIDE = 62.0  # pixels that the grasp point lies off the middle, away from the hand
 STEP_RAD = np.deg2rad(3.0)
 KINDS: tuple[tuple[str, RGB], ...] = (
     ("obstacles at the pickup", palette.PICKUP),
@@ -45,7 +46,8 @@ def dial_svg(grasp: GraspChoice, T_world_plane: NDArray, point: NDArray, hand: H
     """The hand at its chosen angle and, pale, at both ends of its legal range; around it a ring of the legal angles and, inside, one of the
     forbidden ones for each thing that forbids any. The rings lie where the hand comes from, opposite to where its fingers point."""
     view = PlaneView(T_world_plane, point, VIEW_M, WIDTH)
-    shift = np.array([0.0, HEIGHT - WIDTH]) / 2.0
+    low, high = window_of(grasp)
+    shift = np.array([0.0, HEIGHT - WIDTH]) / 2.0 - _at(view, np.zeros(2), (low + high) / 2.0, ASIDE)
     middle = view.pixels(point[None])[0] + shift
     body = part_in_plane(part, grasp.T_part_plane, view) if part is not None else ""
     contact = _in_plane(grasp, grasp.contact_part)

@@ -26,6 +26,7 @@ CHIPS = (
     (OWN, "part itself in the way"),
     (SHORT, "too little contact"),
 )
+LONG = 10  # letters that do not fit beside an icon
 ENDS = {START: "start", GOAL: "goal"}
 
 
@@ -120,7 +121,7 @@ def cell_words(told: Handling, row: int | None, column: int | None) -> str:
 
 def row_name(told: Handling, row: int) -> str:
     """The placement's name, or which end of the MOVE it is."""
-    return ENDS[row].capitalize() + " of the MOVE" if row in ENDS else told.table.placements[told.table.placement_of[row]].name
+    return f"{ENDS[row].capitalize()} of the MOVE" if row in ENDS else told.table.placements[told.table.placement_of[row]].name
 
 
 def _colours(told: Handling, row: int, layout: Layout) -> NDArray:
@@ -152,6 +153,7 @@ def _name(told: Handling, layout: Layout, place: int, picker: str, looked_at: bo
     icon = "" if row in ENDS else part_icon(told.part, T, np.array([13.0, y]), 25.0)
     below = "legal here" if row in ENDS else f"tips at {measured(told.table.placements[told.table.placement_of[row]].tip, 'rad')}"
     name = row_name(told, row).removesuffix(" of the MOVE")
+    name = name if len(name) < LONG else "slanted"
     fill = f'fill="{css(palette.BLUE)}" fill-opacity="{0.12 if looked_at else 0.0:g}"'
     click = f'onclick="{html.esc(html.picking(picker, str(layout.code(place))))}" style="cursor:pointer"'
     x = 29.0 if icon else 4.0

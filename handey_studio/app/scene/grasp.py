@@ -13,7 +13,7 @@ from handey_studio.task.plan import Carry, GraspChoice
 from handey_studio.world import Hand
 
 GRASP, STANDING = "/grasp", "/standing"
-OPACITY = 0.5
+PART_OPACITY, HAND_OPACITY = 0.45, 0.8
 
 
 class GraspScene:
@@ -50,7 +50,7 @@ class StandingScene:
         told, pose = new.handling, standing_pose(new)
         if told is None or pose is None or look.row is None:
             return
-        add_solid(self._scene, STANDING, told.part, palette.ORANGE, pose, OPACITY)
+        add_solid(self._scene, STANDING, told.part, palette.ORANGE, pose, PART_OPACITY)
         if look.column is not None:
             colour = palette.TEAL if told.legal(look.row)[look.column] else palette.VERMILLION
             T, opening = told.table.Ts_part_hand[look.column], float(told.table.openings[look.column])
@@ -62,7 +62,7 @@ def add_hand(scene: viser.SceneApi, name: str, hand: Hand, T: NDArray, opening: 
     place(scene.add_frame(name, show_axes=False), T)
     for box, (lower, upper) in hand.boxes(opening).items():
         size, middle = tuple(np.asarray(upper - lower) * SCALE), (lower + upper) / 2.0 * SCALE
-        scene.add_box(f"{name}/{box}", color=colour, dimensions=size, position=middle, opacity=OPACITY)
+        scene.add_box(f"{name}/{box}", color=colour, dimensions=size, position=middle, opacity=HAND_OPACITY)
 
 
 def add_grasp(scene: viser.SceneApi, grasp: GraspChoice) -> viser.FrameHandle:
