@@ -13,10 +13,10 @@ from handey_studio.grasping import ForbiddenRange
 from handey_studio.task.plan import GraspChoice
 from handey_studio.world import Hand, Part
 
-WIDTH, HEIGHT = 300.0, 236.0
+WIDTH, HEIGHT = 300.0, 246.0
 VIEW_M = 0.26
 LEGAL_RADIUS, RING, GAP = 128.0, 8.0, 1.5
-ASIDE = 62.0  # pixels that the grasp point lies off the middle, away from the hand
+ASIDE = 56.0  # pixels that the grasp point lies off the middle, away from the hand
 STEP_RAD = np.deg2rad(3.0)
 KINDS: tuple[tuple[str, RGB], ...] = (
     ("obstacles at the pickup", palette.PICKUP),
@@ -93,16 +93,21 @@ def _rings(view: PlaneView, middle: NDArray, grasp: GraspChoice) -> str:
             drawn.append(_arc(view, middle, f.low, f.high, radius, colour, RING, f"{f.body or kind}: {_span(f.low, f.high, zero)}"))
     if grasp.forbidden:
         ticks = [zero + np.deg2rad(d) for d in (-60, -30, 0, 30, 60) if low - 1e-6 <= zero + np.deg2rad(d) <= high + 1e-6]
-        drawn += [_tick(view, middle, tick, f"{np.rad2deg(tick - zero):+.0f}°") for tick in ticks]
+        drawn += [_tick(view, middle, tick, _degrees(tick - zero)) for tick in ticks]
     return "".join(drawn)
 
 
 def _span(low: float, high: float, zero: float) -> str:
-    return f"{np.rad2deg(low - zero):+.0f}° to {np.rad2deg(high - zero):+.0f}°"
+    return f"{_degrees(low - zero)} to {_degrees(high - zero)}"
+
+
+def _degrees(angle: float) -> str:
+    number = round(float(np.rad2deg(angle)))
+    return f"{'−' if number < 0 else '+' if number else ''}{abs(number)}°"
 
 
 def _tick(view: PlaneView, middle: NDArray, angle: float, label: str) -> str:
-    return words(_at(view, middle, angle, LEGAL_RADIUS + 10.0) + np.array([0.0, 3.0]), label, 9.0)
+    return words(_at(view, middle, angle, LEGAL_RADIUS + 15.0) + np.array([0.0, 3.0]), label, 9.0)
 
 
 def _arc(view: PlaneView, middle: NDArray, low: float, high: float, radius: float, colour: RGB, width: float, title: str) -> str:

@@ -9,7 +9,7 @@ from handey_studio.app import html, palette
 from handey_studio.app.palette import FILLED, RGB
 from handey_studio.app.svg import PlaneView, arrow, circle, picture_uri, polygon, polyline, svg, words
 from handey_studio.app.svg_part import part_in_plane
-from handey_studio.grasping import BumpOptions, BumpRun, GraspPlane, bump_lines
+from handey_studio.grasping import BumpIterations, BumpOptions, BumpRun, GraspPlane, bump_lines
 from handey_studio.grasping.hand_outline import hand_rectangles
 from handey_studio.task.plan import GraspChoice
 from handey_studio.world import Hand, Part
@@ -68,23 +68,34 @@ def plane_chips(obstacles: str) -> list[tuple[RGB, str]]:
     return [*shown, *rest, (palette.VERMILLION, "bump lines that touch; grasp point")]
 
 
-def plane_words(run: BumpRun, at: int) -> str:
+def plane_words(run: BumpRun, hand: Hand, at: int) -> str:
     """What it took, and what the bump lines do at this point of the path."""
     said = FOUND.get(run.found_by, f"Approach: {run.status}, {html.millimetres(run.distance, 1)} from the grasp point.")
-    told = run.iterations
-    if told is None or not len(told.poses):
+    found = iteration_at(run, hand, run.path[at])
+    if found is None:
         return said
-    k = iteration_at(run, run.path[at])
+    told, k = found
     touching = int(told.colliding[k].sum())
     lines = "no bump line touches" if not touching else f"{touching} bump line{'s' if touching > 1 else ''} touch"
     return f"{said} Iteration {k + 1} of {len(told.poses)}: {lines}; the hand {RULES[int(told.rules[k])]}."
 
 
-def iteration_at(run: BumpRun, pose: NDArray) -> int:
-    """The iteration of the bump lines' run in which the hand was nearest to a pose (y, z, angle)."""
-    if run.iterations is None or not len(run.iterations.poses):
-        return -1
-    return int(np.argmin(((run.iterations.poses - pose) ** 2 * (1.0, 1.0, LEVER_M**2)).sum(axis=1)))
+def iteration_at(run: BumpRun, hand: Hand, pose: NDArray) -> tuple[BumpIterations, int] | None:
+    """The iterations of the bump lines' run, and the number of that in which the hand was nearest to a pose (y, z, angle).
+
+    None if the run kept none, or those of a hand with other bump lines.
+    """
+    told, lines = run.iterations, len(bump_lines(hand, BumpOptions()).vectors)
+    k = 0 if told is None else len(told.poses)
+    shapes = [] if told is None else [told.poses.shape, told.colliding.shape, told.multipliers.shape, told.free.shape, told.rules.shape]
+    if (
+        told is None
+        or not k
+        or shapes != [(k, 3), (k, lines), (k, lines), (k, 2), (k,)]
+        or not np.isin(told.rules, range(len(RULES))).all()
+    ):
+        return None
+    return told, int(np.argmin(((told.poses - pose) ** 2 * (1.0, 1.0, LEVER_M**2)).sum(axis=1)))
 
 
 @lru_cache(maxsize=16)
@@ -123,16 +134,16 @@ def _hand(view: PlaneView, hand: Hand, pose: NDArray, colour: RGB, opacity: floa
 
 def _iteration(view: PlaneView, run: BumpRun, hand: Hand, pose: NDArray) -> list[str]:
     """Bump lines, near solid and far dashed; bump vectors as long as their multipliers; the free motion vector; the unit circle."""
-    lines, k, told = bump_lines(hand, BumpOptions()), iteration_at(run, pose), run.iterations
-    known = told is not None and k >= 0
-    at = told.poses[k] if told is not None and known else pose
-    touching = told.colliding[k] if told is not None and known else np.zeros(len(lines.vectors), dtype=bool)
+    lines, found = bump_lines(hand, BumpOptions()), iteration_at(run, hand, pose)
+    at = pose if found is None else found[0].poses[found[1]]
+    touching = np.zeros(len(lines.vectors), dtype=bool) if found is None else found[0].colliding[found[1]]
     axes, drawn = _axes(at[2]), []
     for ends, far, red in zip(lines.ends @ axes + at[:2], lines.far, touching, strict=True):
         look = (palette.VERMILLION, 2.4) if red else (palette.ORANGE, 1.0)
         drawn.append(polyline(view.pixels(ends), *look, dash="3 3" if far and not red else ""))
-    if told is None or not known:
+    if found is None:
         return drawn
+    told, k = found
     near = ~lines.far
     roots = view.pixels(lines.ends[near].mean(axis=1) @ axes + at[:2])
     units, multipliers = view.directions(lines.vectors[near] @ axes), told.multipliers[k][near]

@@ -73,7 +73,7 @@ def best_of(told: Handling, row: int, columns: Sequence[int]) -> int:
 
 def table_html(told: Handling, layout: Layout, row: int | None, column: int | None, way: Sequence[tuple[int, int]], picker: str) -> str:
     """The picture with its legend, and the cell that is looked at in words."""
-    chips = [*CHIPS, *([(palette.BLUE, "the sequence that was used")] if way else [])]
+    chips = [*CHIPS, *([(palette.BLUE, "the sequence that was used")] if _way(layout, way) else [])]
     return html.figure(table_svg(told, layout, row, column, way, picker), chips, cell_words(told, row, column))
 
 

@@ -10,6 +10,7 @@ import shapely
 from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron, polyhedron_from_polygons
 from handey_studio.geometry.transforms import is_rigid
+from handey_studio.grasping import ForbiddenRange
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session.session import Session, ViewState
 from handey_studio.task.plan import MovePlan
@@ -19,6 +20,7 @@ NOT_IN_NAMES = '/\\:*?"<>|'
 MAX_PARTS, MAX_COMMANDS, MAX_RESULTS, MAX_BODIES = 200, 500, 500, 500
 MAX_MAP_SIDE, MAX_CELL_M = 4000, 0.05
 MAX_COORDINATE_M = 1e3
+MOST_TURN = 20.0  # [rad] hand angles are told from the grasp plane's axes, at most a few turns on
 ANY_NUMBER = ("elevation",)  # arrays in which NaN says that nothing was read
 
 
@@ -34,6 +36,10 @@ def check_session(session: Session) -> None:
             _check_map(path, value)
         elif isinstance(value, MovePlan):
             _check_plan(path, value)
+        elif isinstance(value, ForbiddenRange) and not -MOST_TURN <= value.low <= value.high <= MOST_TURN:
+            raise BadInput(
+                f"{path} goes from {value.low:.3g} to {value.high:.3g} rad; angles go from -{MOST_TURN} to {MOST_TURN} rad, upwards."
+            )
         elif isinstance(value, ViewState) and not value.camera_position.shape == value.camera_look_at.shape == (3,):
             raise BadInput(f"{path} needs a camera position and a point to look at, three coordinates each.")
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from handey_studio.app.background import Background
+from handey_studio.app.commands import ChoosePart
 from handey_studio.app.grasp_commands import LookAtStanding, LookAway, PickCell, PickClass, ShowObstacles, looked_at, standing_pose
 from handey_studio.app.handling import Handle
 from handey_studio.app.state import Handled, opened
@@ -20,7 +21,7 @@ from handey_studio.base import Ledger
 from handey_studio.geometry.transforms import apply
 from handey_studio.grasping import GOAL, START, ForbiddenRange, GraspPlane, plan_approach
 from handey_studio.session.handling import handling
-from tests.session.samples import full_session, library
+from tests.session.samples import fresh_session, full_session, library
 
 EVIL = "<script>alert(1)</script>"
 
@@ -76,13 +77,15 @@ def test_the_plane_shows_the_bump_lines_that_touch_at_the_iteration_of_the_hand(
     told = run.iterations
     k = int(np.argmax(told.colliding.sum(axis=1)))
     assert told.colliding[k].any(), "the heaps are near enough"
-    assert iteration_at(run, told.poses[k]) == k
+    assert iteration_at(run, hand, told.poses[k])[1] == k
     run = replace(run, path=np.vstack([told.poses[: k + 1], run.path[-1:]]))
     svg = grasp_plane_svg(run, hand, k)
     assert len(re.findall(r'stroke="#cc4c18" stroke-width="2.4"', svg)) == told.colliding[k].sum()
-    assert f"Iteration {k + 1} of {len(told.poses)}" in plane_words(run, k) and f"{told.colliding[k].sum()} bump line" in plane_words(
-        run, k
-    )
+    said = plane_words(run, hand, k)
+    assert f"Iteration {k + 1} of {len(told.poses)}" in said and f"{told.colliding[k].sum()} bump line" in said
+    other = replace(hand, T_flange_hand=np.eye(4))  # without a mount, so with fewer bump lines
+    assert iteration_at(run, other, told.poses[k]) is None and "Iteration" not in plane_words(run, other, k)
+    assert grasp_plane_svg(run, other, k).count("unit circle") == 0
 
 
 def test_the_putdowns_cells_come_on_top_of_the_pickups_or_in_their_place(state):
@@ -146,6 +149,16 @@ def test_looking_at_a_class_and_a_cell_ends_with_a_second_click_or_another_part(
     assert PickCell(10**6).apply(at_cell) is at_cell and PickClass(99).apply(at_cell) is at_cell
     assert looked_at(replace(at_cell, handled=None)).row is None, "nothing is known of the part"
     assert looked_at(LookAway().apply(at_cell)).row is None and not at_cell.undo
+
+
+def test_before_any_plan_the_part_that_is_chosen_is_what_the_tab_is_about(tmp_path):
+    fresh = opened(library(tmp_path), fresh_session(tmp_path), None)
+    asked = fresh.to_handle
+    assert asked[0] is fresh.session.part("l_block") and asked[4:] == (None, None) and fresh.handling is None
+    known = Handle(Handled(asked, handling(*asked))).apply(fresh)
+    assert known.handling is not None and "approach groups" in classes_html(known.handling, {}, "", None, "id")
+    other = ChoosePart("brick").apply(known)
+    assert other.to_handle[0].name == "brick" and other.handling is None, "it is another part's"
 
 
 def test_the_ghost_stands_on_the_table_or_at_the_ends_of_the_move(state):

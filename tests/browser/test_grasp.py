@@ -2,7 +2,7 @@
 
 from tests.browser.conftest import ARTEFACTS
 from tests.browser.hands import choose, pane, press, wait_until
-from tests.session.samples import fresh_session, full_session
+from tests.session.samples import full_session
 
 
 def test_classes_and_cells_are_looked_at_by_a_click(studio, visit, tmp_path):
@@ -26,11 +26,3 @@ def test_classes_and_cells_are_looked_at_by_a_click(studio, visit, tmp_path):
     page.screenshot(path=ARTEFACTS / "grasp.png")
     press(page, "Clear")
     wait_until(lambda: "/standing" not in workbench.server.scene._handle_from_node_name and not workbench.state.undo)
-
-
-def test_before_any_plan_the_tab_tells_what_the_hand_can_grasp(studio, visit, tmp_path):
-    workbench = studio(fresh_session(tmp_path))
-    page = visit(workbench)
-    page.get_by_role("tab", name="Grasp").click()
-    pane(page, "classes").wait_for(timeout=120_000)
-    assert "Press Plan" in pane(page, "grasp-empty").inner_text() and "approach groups" in pane(page, "classes").inner_text()

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handey_studio.base import Ledger
+from handey_studio.base import BadInput, Ledger
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.grasping import GOAL, START, ForbiddenRange
-from handey_studio.session import session_from_bytes, session_to_bytes
+from handey_studio.session import check_session, session_from_bytes, session_to_bytes
 from handey_studio.session.handling import column_of, fates, handling, row_of, way_through
 from tests.session.samples import T_START, full_session, library
 
@@ -89,3 +89,12 @@ def test_forbidden_angles_are_kept_in_a_session(session):
     assert back.result.plan.carries[0].grasp.forbidden == ranges
     assert session_from_bytes(session_to_bytes(session), "x").result.plan.carries[0].grasp.forbidden == ()
     assert np.allclose(back.result.plan.T_world_part_start, T_START)
+
+
+def test_a_forged_range_of_angles_is_refused(session):
+    plan = session.result.plan
+    for low, high in ((0.0, 1e9), (2.0, 1.0), (float("nan"), 1.0)):
+        grasp = replace(plan.carries[0].grasp, forbidden=(ForbiddenRange(low, high, "both", "x"),))
+        forged = replace(session.result, plan=replace(plan, carries=(replace(plan.carries[0], grasp=grasp),)))
+        with pytest.raises(BadInput, match="rad"):
+            check_session(replace(session, results=(forged,)))

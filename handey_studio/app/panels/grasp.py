@@ -78,7 +78,7 @@ class GraspPanel:
         set_to(self._obstacles, value=state.grasp_look.obstacles)
         part = state.session.part(state.replay.plan.part)
         picture = grasp_plane_svg(carry.approach, state.robot.hand, at, carry.grasp, part, putdown, which)
-        self._plane.content = html.figure(picture, plane_chips(which), plane_words(carry.approach, at))
+        self._plane.content = html.figure(picture, plane_chips(which), plane_words(carry.approach, state.robot.hand, at))
 
     def _render_part(self, state: State) -> None:
         told, look = state.handling, looked_at(state)
