@@ -13,7 +13,7 @@ from handey_studio.grasping import ForbiddenRange
 from handey_studio.task.plan import GraspChoice
 from handey_studio.world import Hand, Part
 
-WIDTH, HEIGHT = 300.0, 246.0
+WIDTH, HEIGHT = 300.0, 268.0
 VIEW_M = 0.26
 LEGAL_RADIUS, RING, GAP = 128.0, 8.0, 1.5
 ASIDE = 56.0  # pixels that the grasp point lies off the middle, away from the hand
