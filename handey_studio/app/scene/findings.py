@@ -43,7 +43,7 @@ class PlanScene:
         beads = clearance_beads(replay)
         if beads is not None:
             self._beads = scene.add_point_cloud(
-                BEADS, scaled(beads[0]), beads[1], point_size=0.06, point_shape="circle", precision="float32"
+                BEADS, scaled(beads[0]), beads[1], point_size=0.03, point_shape="circle", precision="float32"
             )
 
     def _show(self, state: State) -> None:
