@@ -27,6 +27,7 @@ from handey_studio.task.stages import APPROACH, DETOUR, PATHS, REACH, ROTATIONS,
 ANGLES = 4  # hand angles of one group that are looked at, the most vertical first
 WORTH_S = 0.3  # what a radian less of tilt is worth in time to plan
 TURN_COST = 0.3  # a radian of the joint that turns most counts as so many radians of tilt
+USUAL_TURN_RAD = 2.5  # which is what it turns by as long as nobody knows better
 REGRASP_S = 2.0  # each time that the part is put down on the way
 DETOUR_COST = 1.0  # [rad] each further place to put it down is worth that much less
 ALIKE_RAD = 0.35  # configurations that differ by less than this in every joint are neighbours
@@ -79,6 +80,8 @@ class OptionSearch:
     spent: float = 0.0
     _heap: list[tuple[float, int, Node]] = field(default_factory=list)
     _pushed: int = 0
+    _spare: list[Node] = field(default_factory=list)
+    _planned: set[tuple[tuple[Goal, ...], int]] = field(default_factory=set)
     _kept: Kept = field(default_factory=dict)
     _shut: dict[tuple, LegalRotations] = field(default_factory=dict)
     _planes: dict[tuple, GraspPlane] = field(default_factory=dict)
@@ -89,15 +92,18 @@ class OptionSearch:
     @property
     def waiting(self) -> list[Node]:
         """The options that were not looked at."""
-        return [node for _, _, node in self._heap]
+        return [*(node for _, _, node in self._heap), *self._spare]
 
     def run(self, goals: list[Goal]) -> Iterator[MovePlan]:
         """Plans, the first one soon. Ends when nothing is left, when the effort is spent, or on cancel."""
         for goal in goals:
             self._begin(Route((goal,)))
             self._detour(goal, detours(goal, self.options.regrasps, self.ledger), 0)
-        while self._heap and self.spent < self.options.effort and not self.progress.cancelled:
+        while self._any() and self.spent < self.options.effort and not self.progress.cancelled:
             node = heappop(self._heap)[2]
+            if (node.route.goals, len(node.route.done)) in self._planned:
+                self._spare.append(node)
+                continue
             postponed = self._neighbours(node) if node.stage == PATHS else 0
             if postponed > node.postponed:
                 self._push(node._replace(postponed=postponed))
@@ -108,9 +114,19 @@ class OptionSearch:
             if plan is not None:
                 yield plan
 
+    def _any(self) -> bool:
+        """Whether an option waits. Other ways to do a carry of a route that was planned once are taken up when nothing else is left."""
+        if not self._heap and self._spare:
+            self._planned.clear()
+            for node in self._spare:
+                self._push(node)
+            self._spare.clear()
+        return bool(self._heap)
+
     def _push(self, node: Node) -> None:
         later = len(node.route.goals) - len(node.route.done) - 1
-        expected = WORTH_S * node.cost + NEIGHBOUR_S * node.postponed + left(node.stage) + later * (left(ROTATIONS) + REGRASP_S)
+        cost = node.cost + (TURN_COST * USUAL_TURN_RAD if node.stage < STRAIGHT else 0.0)
+        expected = WORTH_S * cost + NEIGHBOUR_S * node.postponed + left(node.stage) + later * (left(ROTATIONS) + REGRASP_S)
         heappush(self._heap, (expected, self._pushed, node))
         self._pushed += 1
 
@@ -222,6 +238,7 @@ class OptionSearch:
         done = route._replace(done=(*route.done, carried))
         if last:
             return _whole(grasp.option.goal.instance.name, done.done)
+        self._planned.add((route.goals, len(route.done)))
         self._begin(done, node.cost)
         return None
 
