@@ -70,7 +70,8 @@ class Handling:
 
     def groups_of(self, number: int) -> list[int]:
         """Numbers of the groups of a class, the best first."""
-        own = [g for g, group in enumerate(self.groups) if group.grasp_class is self.classes[number]]
+        wanted = self.classes[number].kind, self.classes[number].features
+        own = [g for g, group in enumerate(self.groups) if (group.grasp_class.kind, group.grasp_class.features) == wanted]
         return sorted(own, key=lambda g: self.costs[g])
 
 
