@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -21,9 +21,11 @@ from handey_studio.world import Part, PlacedPart, World
 
 @dataclass(frozen=True)
 class MoveOptions:
-    """`seed` drives every choice by chance; `search` bounds the work, which is counted, not timed."""
+    """`seed` drives every choice by chance; `search` bounds the work, which is counted, not timed. A part that could nearly as well stand
+    otherwise, or be another, is not moved: `most_doubt` is the greatest share of its own probability that the likeliest rival may have."""
 
     seed: int = 0
+    most_doubt: float = 0.8
     search: SearchOptions = field(default_factory=SearchOptions)
 
 
@@ -41,12 +43,16 @@ def plan_move(
     start: Start,
     options: MoveOptions = MoveOptions(),
     progress: Progress = Silent(),
+    doubts: Mapping[str, float] | None = None,
 ) -> MoveResult:
-    """Plan one MOVE in the world as sensed. A MOVE that cannot be planned is a result too, with the reasons in its ledger."""
+    """Plan one MOVE in the world as sensed. A MOVE that cannot be planned is a result too, with the reasons in its ledger.
+
+    `doubts` tell of instances how probable their likeliest rival is, as a share of their own probability.
+    """
     check_command(command, parts)
     ledger, timing = Ledger(), {}
     with _timed(timing, "destination"):
-        goals = _goals(world, command, parts, ledger)
+        goals = _goals(world, command, parts, ledger, doubts or {}, options.most_doubt)
     plan, reason = None, "" if goals else _goal_reason(world, command, ledger)
     if goals:
         search = OptionSearch(start, ledger, progress, np.random.default_rng(options.seed), options.search)
@@ -86,11 +92,17 @@ def _close(search: OptionSearch, plan: MovePlan | None, ledger: Ledger) -> None:
         ledger.add("options", f"{len(waiting)} more", why, value=search.spent, limit=search.options.effort, unit="s")
 
 
-def _goals(world: World, command: MoveCommand, parts: dict[str, Part], ledger: Ledger) -> list[Goal]:
+def _goals(
+    world: World, command: MoveCommand, parts: dict[str, Part], ledger: Ledger, doubts: Mapping[str, float], most_doubt: float
+) -> list[Goal]:
     """The instances that the command may mean, each with every place that its destination may mean."""
     destination = parse_destination(command.to, command.part, parts)
     found = []
     for placed in _candidates(world, command.part):
+        if doubts.get(placed.name, 0.0) > most_doubt:
+            ledger.add("destination", placed.name, "it could nearly as well stand otherwise, or be another part", limit=most_doubt,
+                       value=doubts[placed.name])  # fmt: skip
+            continue
         area = isinstance(destination, Area)
         poses = area_poses(world, placed, destination, ledger) if area else goal_poses(destination, placed.name, parts, world.parts)
         for label, T_world_goal in poses:

@@ -58,7 +58,7 @@ def plan_in(
     begun = time.perf_counter()
     world = believed_world(station.workcell, station.robot, scene)
     built = time.perf_counter() - begun
-    result = plan_move(world, command, station.models, Start(q, opening, station.robot.home), options, progress)
+    result = plan_move(world, command, station.models, Start(q, opening, station.robot.home), options, progress, scene.doubts)
     return replace(result, timing_s=scene.timing_s | {"world": built} | result.timing_s)
 
 

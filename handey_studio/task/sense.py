@@ -23,6 +23,12 @@ class Scene(Value):
     instances: tuple[PlacedPart, ...]
     timing_s: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def doubts(self) -> dict[str, float]:
+        """For each instance how probable the likeliest other reading of it is, as a share of its own probability."""
+        poses = zip(self.instances, self.located.poses, strict=False)
+        return {placed.name: max((r.probability for r in pose.rivals), default=0.0) / max(pose.score, 1e-9) for placed, pose in poses}
+
     def instance(self, name: str) -> PlacedPart | None:
         """The instance of that name, None if it was not found."""
         return next((placed for placed in self.instances if placed.name == name), None)

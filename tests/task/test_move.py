@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from handey_studio.cell.checker import check_plan, names_in_plan
 from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.geometry.transforms import inverse, pose_difference
+from handey_studio.localization import Rival
 from handey_studio.session import find_session, read_session
 from handey_studio.session.run import cell_of, station_of
 from handey_studio.task import MoveCommand, MoveOptions, SearchOptions, execute_in, plan_in, sense
@@ -65,8 +67,6 @@ def test_the_plan_passes_the_independent_check(figure1, planned):
 
 def test_the_checker_would_have_caught_a_plan_through_the_table(figure1, planned):
     """The same plan with its approach pushed on beyond the grasp must not pass."""
-    from dataclasses import replace
-
     steps = list(planned.plan.steps)
     k = next(k for k, step in enumerate(steps) if step.kind == "lift")
     lift = steps[k]
@@ -151,6 +151,16 @@ def test_any_of_the_parts_goes_anywhere_in_an_area(figure1):
     assert check_plan(result.plan.steps, figure1.truth, figure1.station.robot, names_in_plan(figure1.truth, located)).ok
     nowhere = figure1.plan("in:0.47,0.12,0.49,0.14")
     assert nowhere.status == "failed" and "no free place" in nowhere.reason
+
+
+def test_a_part_that_could_as_well_lie_otherwise_is_not_moved(figure1):
+    located = figure1.scene.located
+    rivals = [(Rival(pose.part, pose.T_world_part, 0.97 * pose.score),) for pose in located.poses]
+    poses = tuple(replace(pose, rivals=rival) for pose, rival in zip(located.poses, rivals, strict=True))
+    scene = replace(figure1.scene, located=replace(located, poses=poses))
+    cell = figure1.cell
+    result = plan_in(figure1.station, scene, MoveCommand("l_block", "on:l_block:block"), cell.joints(), cell.opening())
+    assert result.status == "failed" and "could nearly as well stand otherwise" in result.reason and "0.97" in result.reason
 
 
 def test_a_limit_on_the_effort_is_in_the_ledger(figure1):
