@@ -11,7 +11,7 @@ FLOORS = (
     {"geometry"},
     {"world"},
     {"sensing"},
-    {"localization", "motion"},
+    {"modeling", "localization", "motion"},
     {"grasping"},
     {"cell"},
     {"task"},

@@ -11,10 +11,10 @@ from typing import Any
 import msgspec
 
 from handey_studio.base import BadInput
+from handey_studio.base.coding import from_plain, to_plain
 from handey_studio.base.errors import unknown_name
 from handey_studio.base.files import replace_file
 from handey_studio.session.checks import check_name, check_session
-from handey_studio.session.coding import from_plain, to_plain
 from handey_studio.session.session import Session
 from handey_studio.session.upgrade import upgraded
 from handey_studio.world import Library

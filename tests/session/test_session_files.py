@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from handey_studio.base import BadInput
+from handey_studio.base.coding import from_plain, plain_array, to_plain
 from handey_studio.session import files, find_session, own_file, read_session, session_from_bytes, session_to_bytes, write_session
-from handey_studio.session.coding import from_plain, plain_array, to_plain
 from tests.session.samples import fresh_session, full_session, library
 
 

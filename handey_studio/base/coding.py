@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from handey_studio.base import BadInput
+from handey_studio.base.errors import BadInput
 
 T = TypeVar("T")
 DTYPES = ("<f8", "<f4", "<i8", "<i4", "|u1", "|b1")
@@ -40,7 +40,7 @@ def _plain(value: Any) -> Any:
         return plain_array(value)
     if isinstance(value, np.generic):
         return value.item()
-    raise NotImplementedError(f"a {type(value).__name__} has no place in a session")
+    raise NotImplementedError(f"a {type(value).__name__} has no place in a file")
 
 
 def plain_array(array: np.ndarray) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def plain_array(array: np.ndarray) -> dict[str, Any]:
         return {"array": array.tolist()}
     little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
     if little.dtype.str not in DTYPES:
-        raise BadInput(f'an array of type "{little.dtype.str}" cannot be kept in a session; it must be one of {", ".join(DTYPES)}.')
+        raise BadInput(f'an array of type "{little.dtype.str}" cannot be kept in a file; it must be one of {", ".join(DTYPES)}.')
     return {"dtype": little.dtype.str, "shape": list(array.shape), "base64": base64.b64encode(little.tobytes()).decode("ascii")}
 
 
