@@ -22,6 +22,22 @@ class Mate(Value):
         object.__setattr__(self, "T_this_part", frozen_array(self.T_this_part))
 
 
+@dataclass(frozen=True)
+class Provenance:
+    """Where a model came from. `source` in words ("modelled from 2 scans", a file's name), `scans` their names.
+
+    `rms_m` [m], `explained` and `seen` (shares) are those of the model against its scans, None where there were none.
+    `assumed_faces`: faces that no scan has confirmed.
+    """
+
+    source: str = ""
+    scans: tuple[str, ...] = ()
+    rms_m: float | None = None
+    explained: float | None = None
+    seen: float | None = None
+    assumed_faces: tuple[int, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Part(Value):
     """A known polyhedral part. Its frame is that of its model file; `density` [kg/m³], `friction` against the fingers."""
@@ -31,6 +47,7 @@ class Part(Value):
     density: float = 700.0
     friction: float = 0.5
     mates: dict[str, Mate] = field(default_factory=dict)
+    provenance: Provenance = Provenance()
 
     @cached_property
     def pieces(self) -> tuple[NDArray, ...]:
