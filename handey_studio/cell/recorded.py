@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
-from handey_studio.cell.protocol import CannotAct, Moved
+from handey_studio.cell.protocol import TOUCH_N, CannotAct, Compliance, Moved, Wrench
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.motion import Trajectory
 from handey_studio.sensing.depth_map import DepthMap
@@ -41,16 +41,25 @@ class RecordedCell:
     def opening(self) -> float:
         return self._robot.hand.opening_max
 
-    def contact(self) -> bool:
-        return False
+    def wrench(self) -> Wrench:
+        return Wrench(np.zeros(3), np.zeros(3))
+
+    def finger_force(self) -> float:
+        return 0.0
+
+    def stop(self) -> None:
+        """Nothing moves here."""
 
     def follow(self, motion: Trajectory) -> Moved:
         raise _refusal()
 
-    def descend(self, motion: Trajectory) -> Moved:
+    def descend(self, motion: Trajectory, until_N: float = TOUCH_N) -> Moved:
         raise _refusal()
 
-    def grip(self, opening: float) -> float:
+    def settle(self, compliance: Compliance = Compliance()) -> Moved:
+        raise _refusal()
+
+    def grip(self, opening: float, force_N: float | None = None) -> Moved:
         raise _refusal()
 
 

@@ -9,16 +9,18 @@ from handey_studio.base.errors import unknown_name
 from handey_studio.cell.bodies import SolidBody, check_names, fixed_bodies, solid_body
 from handey_studio.cell.gripping import close_fingers
 from handey_studio.cell.guarded import first_touch, motion_at
+from handey_studio.cell.motions import check_motion, check_opening
 from handey_studio.cell.physics import settle
-from handey_studio.cell.protocol import CannotAct, Moved
+from handey_studio.cell.protocol import TOUCH_N, Compliance, Moved, Wrench
+from handey_studio.cell.recording import Event, Recording
 from handey_studio.cell.stripes import photograph
 from handey_studio.cell.workcell import SimulatedSetup, Workcell
+from handey_studio.geometry.transforms import inverse
 from handey_studio.motion import Trajectory
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.world.arm import arm_of
 from handey_studio.world.library import Library
 
-START_RAD = 0.01  # a motion must start this close to where the arm stands
 RELEASE_M = 1e-4  # fingers that open by more than this let go
 LIFTED_M = 0.01  # once the held body has moved this far, what leaned on it falls
 
@@ -48,15 +50,17 @@ class SimulatedCell:
         self._bodies = true_bodies(workcell, library)
         self._q = self._robot.home
         self._opening = self._robot.hand.opening_max
-        self._held: _Held | None = None
-        self._pressing = False
+        self._held = self._held_at_start()
+        self._pressing = self._touching = False
         self._scans = 0
 
     def scan(self) -> DepthMap:
         rng = np.random.default_rng([self._workcell.setup.seed, self._scans])
         self._scans += 1
-        held = self._held.name if self._held else None
-        return photograph(self._workcell.finder, [body for body in self._bodies if body.name != held], rng)
+        held, finder = self._held.name if self._held else None, self._workcell.finder
+        really = replace(finder, T_world_range=self._workcell.setup.T_range_offset @ finder.T_world_range)
+        seen = photograph(really, [body for body in self._bodies if body.name != held], rng)
+        return replace(seen, T_world_range=finder.T_world_range)
 
     def joints(self) -> NDArray:
         return self._q
@@ -64,31 +68,38 @@ class SimulatedCell:
     def opening(self) -> float:
         return self._opening
 
-    def contact(self) -> bool:
-        return self._pressing
+    def wrench(self) -> Wrench:
+        return Wrench(np.zeros(3), np.zeros(3))
+
+    def finger_force(self) -> float:
+        return self._robot.hand.force if self._pressing else 0.0
+
+    def stop(self) -> None:
+        """Nothing to stop: a motion here takes no time."""
 
     def follow(self, motion: Trajectory) -> Moved:
-        self._check(motion)
-        return self._arrive(motion.q_rad[-1], float(motion.time_s[-1]), float(motion.hand_opening_m[-1]))
+        check_motion(motion, self._robot, self._q)
+        return self._arrive(motion, float(motion.time_s[-1]))
 
-    def descend(self, motion: Trajectory) -> Moved:
-        self._check(motion)
+    def descend(self, motion: Trajectory, until_N: float = TOUCH_N) -> Moved:
+        check_motion(motion, self._robot, self._q)
         held = None if self._held is None else (self._body(self._held.name), self._held.T_hand_body)
         others = [body for body in self._bodies if held is None or body.name != held[0].name]
         time = first_touch(self._arm, motion, others, held)
         if time is None:
-            return self.follow(motion)
-        return self._arrive(motion_at(motion, time), time, float(np.interp(time, motion.time_s, motion.hand_opening_m)), contact=True)
+            return self._arrive(motion, float(motion.time_s[-1]))
+        return self._arrive(motion, time, touched_N=until_N)
 
-    def grip(self, opening: float) -> float:
-        hand = self._robot.hand
-        if not hand.opening_min <= opening <= hand.opening_max:
-            raise CannotAct(f"the hand opens from {hand.opening_min} to {hand.opening_max} m, so it cannot go to {opening:.4f} m.")
+    def settle(self, compliance: Compliance = Compliance()) -> Moved:
+        return Moved("contact" if self._touching else "arrived", self._still())
+
+    def grip(self, opening: float, force_N: float | None = None) -> Moved:
+        check_opening(self._robot.hand, opening)
         if self._held is not None:
-            return self._regrip(opening)
-        if opening < self._opening:
+            self._regrip(opening)
+        elif opening < self._opening:
             T_world_hand = self._arm.hand_pose(self._q)
-            grip = close_fingers(hand, T_world_hand, self._bodies, self._opening, opening)
+            grip = close_fingers(self._robot.hand, T_world_hand, self._bodies, self._opening, opening)
             self._opening, self._pressing = grip.opening, grip.opening > opening
             if grip.held is not None and grip.T_hand_body is not None:
                 self._held = _Held(grip.held, grip.T_hand_body, self._body(grip.held).T_world_body)
@@ -96,7 +107,7 @@ class SimulatedCell:
                 self._carry()
         else:
             self._opening, self._pressing = float(opening), False
-        return self._opening
+        return Moved("contact" if self._pressing else "arrived", self._still())
 
     def true_pose(self, name: str) -> NDArray:
         """T_world_body (4, 4) as it really is. Only benchmarks and checkers may ask; a planner that does is cheating."""
@@ -116,25 +127,26 @@ class SimulatedCell:
         bodies = tuple(replace(body, T_world_body=now[body.name]) for body in self._workcell.setup.bodies)
         return replace(self._workcell.setup, bodies=bodies, drop=self._held is not None)
 
-    def _check(self, motion: Trajectory) -> None:
-        q, times = motion.q_rad, motion.time_s
-        if q.ndim != 2 or q.shape[1] != self._arm.n or not len(q) == len(times) == len(motion.hand_opening_m):
-            raise CannotAct(f"the motion has angles {q.shape} for {len(times)} times; this arm takes {self._arm.n} angles at each.")
-        if not (np.isfinite(q).all() and np.isfinite(motion.hand_opening_m).all() and (np.diff(times) >= 0).all()):
-            raise CannotAct("the motion holds a number that is not finite, or times that run backwards.")
-        off = float(np.abs(q[0] - self._q).max())
-        if off > START_RAD:
-            raise CannotAct(f"the motion starts {off:.3f} rad from where the arm stands; the limit is {START_RAD} rad.")
-        if self._robot.limit_margin(q).min() < -1e-9:
-            raise CannotAct("the motion leaves the joint limits.")
-
-    def _arrive(self, q: NDArray, time: float, opening: float, contact: bool = False) -> Moved:
-        self._q = np.array(q)
+    def _arrive(self, motion: Trajectory, time: float, touched_N: float | None = None) -> Moved:
+        """At the motion's `time`, where it ended: by touch if a force is given."""
+        times = np.append(motion.time_s[motion.time_s < time], time)
+        q = np.array([motion_at(motion, at) for at in times])
+        self._q, self._touching = q[-1], touched_N is not None
         if self._held is None:
-            self._opening = opening
+            self._opening = float(np.interp(time, motion.time_s, motion.hand_opening_m))
         else:
             self._carry()
-        return Moved(self._q, time, contact)
+        events = () if touched_N is None else (Event(time, "touch", touched_N),)
+        return Moved("contact" if self._touching else "arrived", self._recorded(times, q, events))
+
+    def _still(self) -> Recording:
+        return self._recorded(np.zeros(1), self._q[None])
+
+    def _recorded(self, times: NDArray, q: NDArray, events: tuple[Event, ...] = ()) -> Recording:
+        """Forces are unknown to geometry and stand as zero."""
+        n = len(times)
+        none, fingers = np.zeros((n, 3)), np.full(n, self.finger_force())
+        return Recording(times, q, q, np.full(n, self._opening), fingers, none, none, events)
 
     def _carry(self) -> None:
         """Put the held body where the hand has it; once it has left its place, let the others settle."""
@@ -147,11 +159,17 @@ class SimulatedCell:
             self._held = replace(held, left=True)
             self._replace(settle([body for body in self._bodies if body.name != held.name]).bodies)
 
-    def _regrip(self, opening: float) -> float:
+    def _regrip(self, opening: float) -> None:
         if opening > self._opening + RELEASE_M:
             self._held, self._pressing, self._opening = None, False, float(opening)
             self._replace(settle(self._bodies).bodies)
-        return self._opening
+
+    def _held_at_start(self) -> _Held | None:
+        name = self._workcell.setup.held
+        if name is None:
+            return None
+        T_world_body = self._body(name).T_world_body
+        return _Held(name, inverse(self._arm.hand_pose(self._q)) @ T_world_body, T_world_body, left=True)
 
     def _body(self, name: str) -> SolidBody:
         for body in self._bodies:

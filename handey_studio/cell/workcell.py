@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
+from handey_studio.cell.faults import Fault
 from handey_studio.sensing.range_finder import RangeFinder
 from handey_studio.world.world import DEFAULT_FREE_SPACE, Block
 
@@ -30,11 +31,23 @@ class TrueBody(Value):
 
 @dataclass(frozen=True, eq=False)
 class SimulatedSetup(Value):
-    """The hidden truth of a simulated cell. With `drop`, the bodies fall from their poses until they rest; `seed` drives the noise."""
+    """The hidden truth of a simulated cell. With `drop`, the bodies fall from their poses until they rest; `seed` drives the noise.
+
+    With `physics` everything obeys forces, else the arm is followed exactly and grips are geometric. `faults` go wrong on purpose. The
+    range finder really stands at `T_range_offset @ T_world_range`, which nobody knows before it is calibrated. The body called `held` is
+    in the closed hand at the start, where the arm stands at home.
+    """
 
     bodies: tuple[TrueBody, ...] = ()
     drop: bool = False
     seed: int = 0
+    physics: bool = False
+    faults: tuple[Fault, ...] = ()
+    T_range_offset: NDArray = field(default_factory=lambda: np.eye(4))
+    held: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_range_offset", frozen_array(self.T_range_offset))
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,10 +49,11 @@ def execute(plan: MovePlan, carried: World, part: Part, cell: Cell, ledger: Ledg
 def _do(step: Step, carry: Carry, carried: World, held: Held, cell: Cell, reached: NDArray | None) -> tuple[str, NDArray | None]:
     """One step; (problem or "", the part's pose by the arm's joints once it was put down)."""
     if step.kind == "close":
-        width = cell.grip(carry.grasp.width - GRIP_TOLERANCE_M)
+        closed = cell.grip(carry.grasp.width - GRIP_TOLERANCE_M)
+        width = closed.opening_m
         off = abs(width - carry.grasp.width)
-        if not cell.contact() or off > GRIP_TOLERANCE_M:
-            what = "the fingers closed on nothing" if not cell.contact() else "the fingers hold something of another width"
+        if not closed.contact or off > GRIP_TOLERANCE_M:
+            what = "the fingers closed on nothing" if not closed.contact else "the fingers hold something of another width"
             return f"{what}: {1e3 * width:.1f} mm, expected {1e3 * carry.grasp.width:.1f} ± {1e3 * GRIP_TOLERANCE_M:.1f} mm", reached
         return "", reached
     if step.kind == "open":

@@ -31,9 +31,9 @@ def test_it_scans_and_refuses_to_act(kept, robot):
     path, depth_map = kept
     cell: Cell = RecordedCell.from_file(robot, path)
     assert cell.scan() == depth_map
-    assert np.array_equal(cell.joints(), robot.home) and cell.opening() == robot.hand.opening_max and not cell.contact()
+    assert np.array_equal(cell.joints(), robot.home) and cell.opening() == robot.hand.opening_max and not cell.finger_force()
     motion = Trajectory(np.zeros(1), robot.home[None], np.zeros(1))
-    for act in (lambda: cell.follow(motion), lambda: cell.descend(motion), lambda: cell.grip(0.0)):
+    for act in (lambda: cell.follow(motion), lambda: cell.descend(motion), lambda: cell.settle(), lambda: cell.grip(0.0)):
         with pytest.raises(CannotAct, match="recorded depth map"):
             act()
 

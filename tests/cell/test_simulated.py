@@ -45,7 +45,7 @@ def test_scans_are_repeatable_by_seed_and_differ_from_one_another(library):
 def test_a_part_is_gripped_lifted_set_down_and_let_go(cell, arms, robot):
     start = cell.true_pose("l_block#2")
     T_hand, up = lifted(cell, arms)
-    assert cell.held_truly() == "l_block#2" and cell.contact()
+    assert cell.held_truly() == "l_block#2" and cell.finger_force() > 0
     assert cell.opening() == pytest.approx(0.04, abs=1e-6)
     assert np.allclose(cell.true_pose("l_block#2")[:3, 3] - start[:3, 3], (0, 0, 0.12), atol=1e-6)
 
@@ -55,8 +55,8 @@ def test_a_part_is_gripped_lifted_set_down_and_let_go(cell, arms, robot):
     assert cell.true_pose("l_block#2")[2, 3] - start[2, 3] == pytest.approx(0.0, abs=3e-5)
     assert np.allclose(cell.joints(), moved.q_rad)
 
-    assert cell.grip(robot.hand.opening_max) == robot.hand.opening_max
-    assert cell.held_truly() is None and not cell.contact()
+    assert cell.grip(robot.hand.opening_max).opening_m == robot.hand.opening_max
+    assert cell.held_truly() is None and not cell.finger_force()
     assert pose_difference(cell.true_pose("l_block#2"), start)[0] < 2e-4
 
 
@@ -103,8 +103,8 @@ def test_the_bare_hand_feels_the_table(library, arms):
 
 
 def test_a_grip_on_nothing_reaches_what_was_asked(cell):
-    assert cell.grip(0.01) == 0.01
-    assert not cell.contact() and cell.held_truly() is None
+    assert cell.grip(0.01).opening_m == 0.01
+    assert not cell.finger_force() and cell.held_truly() is None
 
 
 def test_the_scan_leaves_out_what_the_hand_holds(cell, arms):
