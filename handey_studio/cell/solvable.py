@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from handey_studio.base import BadInput
+from handey_studio.cell.alike import seen_alike
 from handey_studio.cell.bodies import SolidBody, fixed_bodies, solid_body
 from handey_studio.cell.fitness import visible_share
 from handey_studio.cell.penetration import Polytope, overlap, polytope, polytopes_of
@@ -83,13 +84,16 @@ Hands = list[tuple[NDArray, float, PlacedPart]]
 
 
 def _places(workcell: Workcell, model: Part, rng: np.random.Generator, options: SolvableOptions) -> tuple[NDArray, NDArray, int, int]:
-    """Two stable poses in the scanned area, and the numbers of their placements."""
+    """Two stable poses in the scanned area, the first one told apart from above, and the numbers of their placements."""
     placements, _ = stable_placements(model)
     area = np.array(workcell.finder.area)
     spots = rng.uniform(options.inside, area - options.inside, (2, 2))
     while np.linalg.norm(spots[1] - spots[0]) < options.apart:
         spots = rng.uniform(options.inside, area - options.inside, (2, 2))
     kinds = rng.integers(len(placements), size=2)
+    alike = seen_alike(model)
+    while alike[kinds[0]] and not all(alike):
+        kinds[0] = rng.integers(len(placements))
     poses = []
     for spot, kind in zip(spots, kinds, strict=True):
         x, y, _ = apply(workcell.finder.T_world_range, (*spot, 0.0))
