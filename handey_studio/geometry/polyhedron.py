@@ -76,7 +76,16 @@ class Polyhedron(Value):
     @cached_property
     def triangles(self) -> NDArray:
         """Corner numbers of a triangulation (k, 3), outward, without new corners."""
-        return frozen_array(np.concatenate([self.face_triangles(f) for f in range(len(self.faces))]), int)
+        return frozen_array(np.concatenate(self._triangles_by_face), int)
+
+    @cached_property
+    def face_of_triangle(self) -> NDArray:
+        """The face (k,) that each of the triangles belongs to."""
+        return frozen_array(np.repeat(np.arange(len(self.faces)), [len(rows) for rows in self._triangles_by_face]), int)
+
+    @cached_property
+    def _triangles_by_face(self) -> list[NDArray]:
+        return [self.face_triangles(f) for f in range(len(self.faces))]
 
     @cached_property
     def diameter(self) -> float:

@@ -31,14 +31,15 @@ class Ray(Value):
 class SnapOptions:
     """What a click may snap to, in order of preference, and from how many pixels of the screen each draws it.
 
-    `kinds` without "vertex", "edge" or "plane" leaves these out; without any of them the reading or surface point itself is
-    taken. `to_model` and `scans` say what can be hit at all: the solid, and which scans (None: all). `hidden_m` [m]: a feature
-    that lies deeper than this behind what its own line of sight meets first is hidden.
+    `kinds` without "vertex", "edge" or "plane" leaves these out; without any of them the reading or surface point itself is taken.
+    The model's own features count as `model_px` nearer than a patch's. `to_model` and `scans` say what can be hit at all: the solid,
+    and which scans (None: all). `hidden_m` [m]: a feature deeper than this behind what its own line of sight meets first is hidden.
     """
 
     kinds: tuple[str, ...] = ("vertex", "edge", "plane")
     vertex_px: float = 14.0
     edge_px: float = 9.0
+    model_px: float = 4.0
     to_model: bool = True
     scans: tuple[int, ...] | None = None
     hidden_m: float = 0.004
