@@ -72,7 +72,7 @@ def sound_corners(outline: Outline) -> NDArray:
 def _crossing(polygon: shapely.Polygon) -> str:
     """Which two sides cross, in words."""
     corners = shapely.get_coordinates(polygon)
-    sides = shapely.linestrings(np.stack([corners[:-1], corners[1:]], axis=1))
+    sides = [shapely.LineString(pair) for pair in zip(corners[:-1], corners[1:], strict=True)]
     n = len(sides)
     for i in range(n):
         for j in range(i + 2, n - (i == 0)):

@@ -54,16 +54,6 @@ class CornerAt(Value):
 Reference = FaceAt | EdgeAt | CornerAt
 
 
-@dataclass(frozen=True)
-class LookUpOptions:
-    """How a reference is looked up: a face or an edge may have turned by `most_turn` [rad], and a turn of one radian weighs as much as
-    `turn_m` of distance; nothing farther than `reach` [m] is meant."""
-
-    most_turn: float = float(np.deg2rad(35.0))
-    turn_m: float = 0.1
-    reach: float = 0.25
-
-
 def keep(value: Any, name: str, content: Any) -> None:
     """Set a field of a frozen dataclass while it is being made."""
     object.__setattr__(value, name, content)

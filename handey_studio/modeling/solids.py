@@ -1,0 +1,175 @@
+"""Exact operations on solids: join, cut, common, half spaces, mirror images, prisms between two planes (Handey 1987 §1).
+
+The booleans are manifold3d's, in double precision; every face of a result is then put back exactly into the plane that it came from.
+"""
+
+from typing import Literal
+
+import manifold3d
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from handey_studio.base import BadInput, measured
+from handey_studio.geometry import Face, Polyhedron, polyhedron_from_polygons
+from handey_studio.modeling.planes import corners_on_planes, flat, nearest_plane, onto_planes, sound, told_point
+
+FLUSH_M = 2e-5  # a face of a tool this near to a plane of the solid is meant to be in it; what lay between would be a sliver
+SLIVER_M = 1e-4  # narrower than a tenth of a millimetre is a slip of the hand, and no sensor sees it
+SAME_VOLUME_M3 = 1e-13
+FAR_M = 3.0
+WORDS = {"join": "joining them", "cut": "the cut", "common": "keeping what is common"}
+
+
+def combined(solid: Polyhedron, tool: Polyhedron, how: Literal["join", "cut", "common"]) -> Polyhedron:
+    """The two solids joined, the second cut from the first, or what is common to both.
+
+    Raises BadInput with one sentence when nothing is left, nothing changes, or what is left is no single solid body without slivers.
+    """
+    tool = _made_flush(tool, solid)
+    a, b = _manifold(solid), _manifold(tool)
+    result = {"join": a + b, "cut": a - b, "common": a ^ b}[how]
+    _check_effect(a, b, result, how)
+    normals = np.concatenate([solid.normals, tool.normals])
+    offsets = np.concatenate([solid.offsets, tool.offsets])
+    least = min(SLIVER_M, narrowest(solid)[0], narrowest(tool)[0])
+    return _polyhedron(result, normals, offsets, least, WORDS[how])
+
+
+def cut_by_plane(solid: Polyhedron, point: ArrayLike, normal: ArrayLike) -> Polyhedron:
+    """The part of a solid on the far side of a plane from where its `normal` (3,) points. Raises BadInput."""
+    normal = np.asarray(normal, dtype=float) / np.linalg.norm(normal)
+    offset = float(normal @ np.asarray(point, dtype=float))
+    heights = solid.vertices @ normal - offset
+    if heights.max() < SLIVER_M:
+        raise BadInput("the plane does not pass through the solid on the side that it would cut off; nothing would change.")
+    if heights.min() > -SLIVER_M:
+        raise BadInput("the plane would cut off the whole solid; turn it round or move it.")
+    result = _manifold(solid).trim_by_plane(tuple(-normal), -offset)
+    normals, offsets = np.vstack([solid.normals, normal]), np.append(solid.offsets, offset)
+    return _polyhedron(result, normals, offsets, min(SLIVER_M, narrowest(solid)[0]), WORDS["cut"])
+
+
+def mirrored(solid: Polyhedron, point: ArrayLike, normal: ArrayLike) -> Polyhedron:
+    """The mirror image of a solid in a plane; its faces are in the same order."""
+    normal = np.asarray(normal, dtype=float) / np.linalg.norm(normal)
+    heights = solid.vertices @ normal - normal @ np.asarray(point, dtype=float)
+    faces = tuple(Face(face.outer[::-1], tuple(hole[::-1] for hole in face.holes)) for face in solid.faces)
+    return Polyhedron(solid.vertices - 2.0 * heights[:, None] * normal, faces)
+
+
+def prism_between(rings: list[NDArray], normal: NDArray, far_normal: NDArray, far_offset: float) -> Polyhedron:
+    """A planar outline with holes, drawn out along its `normal` (3,), either way, as far as the plane `far_normal` · x = `far_offset` [m].
+
+    `rings`: (n, 3) [m] each, the outline first. Raises BadInput when the plane lies along the normal or crosses the outline.
+    """
+    slope = float(far_normal @ normal)
+    if abs(slope) < 0.05:
+        raise BadInput("the plane to extrude to runs along the extrusion; choose one that lies across it.")
+    heights = [(far_offset - ring @ far_normal) / slope for ring in rings]
+    all_heights = np.concatenate(heights)
+    if np.abs(all_heights).max() > FAR_M:
+        raise BadInput(f"the extrusion would be {measured(float(np.abs(all_heights).max()), 'm')} long, the limit is {FAR_M * 1e3:.0f} mm.")
+    if all_heights.min() < SLIVER_M and all_heights.max() > -SLIVER_M:
+        if np.ptp(all_heights) < SLIVER_M:
+            raise BadInput(f"the extrusion has no height; it must be at least {measured(SLIVER_M, 'm')} high.")
+        raise BadInput("the plane to extrude to crosses the outline; all of the outline must lie on one side of it.")
+    up = float(np.sign(all_heights[0]))
+    tops = [ring + height[:, None] * normal for ring, height in zip(rings, heights, strict=True)]
+    return _prism(rings, tops, up * normal)
+
+
+def narrowest(solid: Polyhedron) -> tuple[float, NDArray]:
+    """The width [m] of a solid's narrowest face or the length of its shortest edge, whichever is less, and where (3,) [m]."""
+    best, where = np.inf, solid.vertices[0]
+    for face, normal in zip(solid.faces, solid.normals, strict=True):
+        rings = [solid.vertices[list(loop)] for loop in face.loops]
+        area = sum(float(normal @ np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)) for ring in rings)
+        for corners in rings:
+            sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+            width = min(float(sides.min()), area / float(sides.max()))
+            if width < best:
+                best, where = width, corners[int(np.argmin(sides))]
+    return best, where
+
+
+def _prism(bottoms: list[NDArray], tops: list[NDArray], up: NDArray) -> Polyhedron:
+    """The solid between two sets of rings, the second in the direction `up` of the first."""
+    vertices = np.concatenate([*bottoms, *tops])
+    half = sum(len(ring) for ring in bottoms)
+    start, loops, sides = 0, [], []
+    for number, ring in enumerate(bottoms):
+        loop = tuple(range(start, start + len(ring)))
+        left = float(np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0) @ up) > 0
+        loop = loop if left == (number == 0) else loop[::-1]
+        loops.append(loop)
+        sides += [Face((a, b, half + b, half + a)) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
+        start += len(ring)
+    top = Face(tuple(half + c for c in loops[0]), tuple(tuple(half + c for c in loop) for loop in loops[1:]))
+    bottom = Face(loops[0][::-1], tuple(loop[::-1] for loop in loops[1:]))
+    return sound(vertices, (top, bottom, *sides))
+
+
+def _manifold(solid: Polyhedron) -> manifold3d.Manifold:
+    made = manifold3d.Manifold(manifold3d.Mesh64(np.array(solid.vertices), np.array(solid.triangles, dtype=np.uint64)))
+    if made.status() != manifold3d.Error.NoError or made.is_empty():
+        raise BadInput("the surface of the solid is not closed; it cannot be cut or joined.")
+    return made
+
+
+def _made_flush(tool: Polyhedron, solid: Polyhedron) -> Polyhedron:
+    """The tool with those of its faces that nearly lie in a plane of the solid put exactly into it, where its corners allow."""
+    normals, offsets = np.array(tool.normals), np.array(tool.offsets)
+    for f in range(len(tool.faces)):
+        k, sign, off = nearest_plane(tool, f, solid.normals, solid.offsets)
+        if off < FLUSH_M:
+            normals[f], offsets[f] = sign * solid.normals[k], sign * solid.offsets[k]
+    try:
+        return Polyhedron(corners_on_planes(tool, normals, offsets), tool.faces)
+    except BadInput:  # more than three faces meet at a corner: it stays as it was drawn
+        return tool
+
+
+def _check_effect(a: manifold3d.Manifold, b: manifold3d.Manifold, result: manifold3d.Manifold, how: str) -> None:
+    """Raises BadInput when the two do not meet, or the result is empty or no other than the first."""
+    common = (a ^ b).volume()
+    if how == "join" and common < SAME_VOLUME_M3:
+        gap = a.min_gap(b, FAR_M)
+        if gap > FLUSH_M:
+            raise BadInput(f"the two bodies do not touch, they are {measured(gap, 'm')} apart; a part is one body.")
+    if result.volume() < SAME_VOLUME_M3:
+        raise BadInput("the cut would leave nothing of the solid." if how == "cut" else "the two bodies have nothing in common.")
+    if abs(result.volume() - a.volume()) < SAME_VOLUME_M3:
+        told = {"join": "the new body lies wholly inside the solid", "cut": "the cut does not touch the solid"}
+        raise BadInput(f"{told.get(how, 'the solid lies wholly inside the other body')}; nothing would change.")
+
+
+def _polyhedron(result: manifold3d.Manifold, normals: NDArray, offsets: NDArray, least: float, what: str) -> Polyhedron:
+    """The solid of a boolean's mesh, its faces in the planes that they came from. Raises BadInput when it is not one sound body."""
+    mesh = result.to_mesh64()
+    vertices, triangles = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
+    triangles = _one_body(vertices, triangles, what)
+    solid = flat(onto_planes(polyhedron_from_polygons(vertices, triangles.tolist()), normals, offsets))
+    width, where = narrowest(solid)
+    if width < least * (1.0 - 1e-6):
+        raise BadInput(
+            f"{what} would leave a sliver {measured(width, 'm')} wide at {told_point(where)}; move it to meet the solid or clear it."
+        )
+    return solid
+
+
+def _one_body(vertices: NDArray, triangles: NDArray, what: str) -> NDArray:
+    """The triangles without specks. Raises BadInput when they bound several bodies, or one with a hollow."""
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
+    _, group = connected_components(coo_array((np.ones(len(sides)), sides.T), shape=(len(vertices),) * 2), directed=False)
+    groups = group[triangles[:, 0]]
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    volumes = np.bincount(groups, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, minlength=group.max() + 1)
+    bodies = np.flatnonzero(volumes > SAME_VOLUME_M3)
+    if len(bodies) > 1:
+        told = " and ".join(f"{volume * 1e6:.3g} cm³" for volume in sorted(volumes[bodies])[::-1][:3])
+        raise BadInput(f"{what} would leave {len(bodies)} separate bodies, of {told}; a part is one body.")
+    if (volumes < -SAME_VOLUME_M3).any():
+        raise BadInput(f"{what} would leave a hollow of {-volumes.min() * 1e6:.3g} cm³ inside the solid; a part is solid.")
+    return triangles[np.isin(groups, bodies)]
