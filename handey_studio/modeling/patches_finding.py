@@ -1,0 +1,152 @@
+"""From a scan to its patches: regions of readings on one plane, their outlines, and which of them belong to one body."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion, distance_transform_edt, find_objects
+
+from handey_studio.geometry.transforms import apply
+from handey_studio.modeling.patches import Crease, Patch, Patches
+from handey_studio.modeling.patches_bodies import bodies_of, creases_of
+from handey_studio.modeling.patches_growing import Camera, grown, normals_of, planes_of
+from handey_studio.modeling.patches_outlines import SUPPORT, Seen, area_of, lost_at_rims, outlines_of
+from handey_studio.modeling.patches_windows import Field, field_of
+from handey_studio.modeling.scans import Scan
+from handey_studio.sensing.depth_view import DepthView, Pinhole
+from handey_studio.sensing.facets import sigma_at
+
+ON_SUPPORT_SIGMAS = 4.5
+INNER_PX = 2  # beside edges sensors smooth: planes are fitted without them where enough is left
+INNER_SHARE = 0.4
+
+
+@dataclass(frozen=True)
+class PatchOptions:
+    """`least_readings` of a patch, and `least_radius_px` of the largest circle in it: less is a rounded edge or chance."""
+
+    least_readings: int = 40
+    least_radius_px: float = 3.5
+
+
+def patches_of(scan: Scan, options: PatchOptions = PatchOptions()) -> Patches:
+    """The planar faces above the support that a scan shows; none in a view without readings above it."""
+    view = scan.view
+    sigma = _sigma(view)
+    points = apply(view.T_world_sensor, view.points_sensor())
+    height = points[..., 2]
+    with np.errstate(invalid="ignore"):
+        above, support = height > ON_SUPPORT_SIGMAS * sigma, np.abs(height) <= ON_SUPPORT_SIGMAS * sigma
+    camera = camera_of(view)
+    field = field_of(view, above)
+    labels, _ = grown(field, camera)
+    labels = _without_slivers(labels, options)
+    if labels.max() < 0:
+        return Patches(np.where(support, SUPPORT, labels), (), ())
+    planes = _world_planes(view, _inner_planes(field, labels), camera)
+    labels = np.where((labels < 0) & support, SUPPORT, labels)
+    creases = creases_of(view, points, labels, planes, sigma)
+    return _told(view, labels, planes, sigma, points, creases)
+
+
+def patch_at(patches: Patches, u: float, v: float, reach_px: int = 4) -> Patch | None:
+    """The patch at or nearest to a pixel, up to `reach_px` away; None where there is none."""
+    height, width = patches.labels.shape
+    j, i = round(v), round(u)
+    top, left = max(0, j - reach_px), max(0, i - reach_px)
+    near = patches.labels[top : j + reach_px + 1, left : i + reach_px + 1] if j > -reach_px and i > -reach_px else np.empty((0, 0))
+    rows, columns = np.nonzero(near >= 0)
+    if not len(rows) or j >= height + reach_px or i >= width + reach_px:
+        return None
+    nearest = int(np.argmin((rows + top - v) ** 2 + (columns + left - u) ** 2))
+    number = int(near[rows[nearest], columns[nearest]])
+    return patches.patches[number]
+
+
+def camera_of(view: DepthView) -> Camera:
+    p = view.projection
+    return (0.0, p.fx, p.fy, p.cx, p.cy) if isinstance(p, Pinhole) else (1.0, 1.0 / p.pixel, 1.0 / p.pixel, p.cx, p.cy)
+
+
+def _sigma(view: DepthView) -> NDArray:
+    known = np.isfinite(view.depth)
+    sigma = np.full(view.depth.shape, np.nan)
+    sigma[known] = sigma_at(view, view.depth[known])
+    return sigma
+
+
+def _without_slivers(labels: NDArray, options: PatchOptions) -> NDArray:
+    """Labels of regions that are large and wide enough, numbered anew from 0, the largest first."""
+    kept = []
+    for k, part in enumerate(find_objects(labels + 1)):
+        if part is None:
+            continue
+        inside = np.pad(labels[part] == k, 1)
+        count = int(inside.sum())
+        if count >= options.least_readings and np.asarray(distance_transform_edt(inside)).max() >= options.least_radius_px:
+            kept.append((count, k))
+    number = np.full(max(int(labels.max()) + 1, 1), -1, np.int32)
+    for new, (_, k) in enumerate(sorted(kept, reverse=True)):
+        number[k] = new
+    return np.where(labels >= 0, number[labels], -1).astype(np.int32)
+
+
+def _inner_planes(field: Field, labels: NDArray) -> NDArray:
+    """Planes (n, 3) of the value through the readings that are not beside the region's end."""
+    inner = np.full_like(labels, -1)
+    for k, part in enumerate(find_objects(labels + 1)):
+        inside = np.pad(labels[part] == k, 1)
+        core = binary_erosion(inside, np.ones((3, 3)), INNER_PX)
+        use = core if core.sum() > INNER_SHARE * inside.sum() else inside
+        inner[part][use[1:-1, 1:-1]] = k
+    return planes_of(field, inner, int(labels.max()) + 1)
+
+
+def _world_planes(view: DepthView, planes: NDArray, camera: Camera) -> NDArray:
+    """Normals and offsets (n, 4) in the world's frame of planes (n, 3) of the value."""
+    normals = normals_of(planes, camera)
+    constant = planes[:, 0] + planes[:, 1] * camera[3] + planes[:, 2] * camera[4]
+    if camera[0]:
+        away = np.stack([planes[:, 1] * camera[1], planes[:, 2] * camera[2], -np.ones(len(planes))], axis=1)
+        offsets = -constant / np.linalg.norm(away, axis=1)
+    else:
+        away = np.stack([planes[:, 1] * camera[1], planes[:, 2] * camera[2], constant], axis=1)
+        offsets = -1.0 / np.linalg.norm(away, axis=1)
+    R, t = view.T_world_sensor[:3, :3], view.T_world_sensor[:3, 3]
+    world = normals @ R.T
+    return np.column_stack([world, offsets + world @ t])
+
+
+def _told(view: DepthView, labels: NDArray, planes: NDArray, sigma: NDArray, points: NDArray, creases: tuple[Crease, ...]) -> Patches:
+    """The patches with their outlines; regions without a simple outline stay labels that belong to no patch."""
+    seen = Seen(view, labels, planes, sigma, lost_at_rims(view))
+    outlines = [outlines_of(seen, k) for k in range(len(planes))]
+    kept = [k for k, found in enumerate(outlines) if found]
+    number = np.full(len(planes), -1)
+    number[kept] = np.arange(len(kept))
+    creases = tuple(Crease(int(number[c.a]), int(number[c.b]), c.convex, c.readings) for c in creases if number[[c.a, c.b]].min() >= 0)
+    labels = np.where(labels >= 0, number[labels], labels)
+    objects = bodies_of(labels, creases, len(kept))
+    owner = {patch: k for k, members in enumerate(objects) for patch in members}
+    patches = []
+    for new, k in enumerate(kept):
+        on = points[labels == new]
+        off = on @ planes[k, :3] - planes[k, 3]
+        rms = float(np.sqrt(np.mean(off**2)))
+        rings = [outline.ring for outline in outlines[k]]
+        borders = tuple(
+            tuple(type(b)(b.kind, int(number[b.other]) if b.other >= 0 else b.other, b.sigma) for b in outline.borders)
+            for outline in outlines[k]
+        )
+        tilt = 2.0 * rms / max(_width(on, planes[k, :3]), 1e-6)
+        area = area_of(rings, planes[k, :3])
+        patches.append(Patch(new, planes[k, :3], float(planes[k, 3]), tuple(rings), borders, rms, area, len(on), tilt, owner[new]))
+    return Patches(labels, tuple(patches), objects, creases)
+
+
+def _width(points: NDArray, normal: NDArray) -> float:
+    """The smaller extent [m] of points (n, 3) on a plane, as a rectangle's of their spread."""
+    spread = points - points.mean(axis=0)
+    spread = spread - (spread @ normal)[:, None] * normal
+    values = np.linalg.eigvalsh(spread.T @ spread / len(points))
+    return float(np.sqrt(12.0 * max(values[1], 0.0)))
