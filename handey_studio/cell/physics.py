@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ mujoco: Any = import_module("mujoco")  # compiled, its types are incomplete
 
 STEP_S = 0.002
 CONTACT_TIME_S = 0.004  # stiffest that two steps per time constant allow: keeps what sinks into contacts below 0.1 mm
+BODIES, ARM, FINGERS = 1, 2, 4  # who may touch whom: arm and bodies meet; fingers meet what is fixed, and bodies by pairs of their own
+EVERYTHING = BODIES | ARM | FINGERS
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,12 @@ def settle(bodies: Sequence[SolidBody], options: SettleOptions | None = None, pr
         if step % 200 == 0:
             progress.report(step / options.max_steps, f"bodies fall, step {step}")
     poses = iter(data.qpos.reshape(-1, 7).copy())
-    rested = tuple(body if body.fixed else body.at(_pose(next(poses))) for body in bodies)
+    rested = tuple(body if body.fixed else body.at(pose_of(next(poses))) for body in bodies)
     return Settled(rested, calm >= options.calm_steps, step)
 
 
-def _pose(qpos: NDArray) -> NDArray:
+def pose_of(qpos: NDArray) -> NDArray:
+    """The pose (4, 4) of a free body from its place and quaternion (7,)."""
     w, x, y, z = qpos[3:] / np.linalg.norm(qpos[3:])
     R = np.array(
         [
@@ -71,28 +74,53 @@ def _pose(qpos: NDArray) -> NDArray:
 
 
 def _model(bodies: Sequence[SolidBody]) -> Any:
-    """A MuJoCo model: one body each, one mesh geom a convex piece."""
+    """A MuJoCo model of bodies alone."""
+    spec = new_spec()
+    add_bodies(spec, bodies)
+    return spec.compile()
+
+
+def new_spec() -> Any:
+    """An empty model with the settings that resting and gripped bodies need."""
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP_S
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0  # friction as stiff as this keeps resting bodies from creeping
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    return spec
+
+
+class Touching(NamedTuple):
+    """What a piece is (`own`) and what it meets (`others`), how dense it is [kg/m³], its friction."""
+
+    own: int
+    others: int = 0
+    density: float = 0.0
+    friction: float = 0.5
+
+
+def add_bodies(spec: Any, bodies: Sequence[SolidBody]) -> None:
+    """Bodies `body0` … in the order given, one geom `piece0_0` … a convex piece; those that are not fixed are free."""
     for number, body in enumerate(bodies):
         T = body.T_world_body
         node = spec.worldbody.add_body(name=f"body{number}", pos=T[:3, 3], quat=to_wxyz(T))
         if not body.fixed:
             node.add_freejoint()
+        touching = Touching(BODIES, EVERYTHING if body.fixed else BODIES | ARM, body.density, body.friction)
         for k, piece in enumerate(body.pieces):
-            _add_piece(spec, node, f"piece{number}_{k}", piece, body)
-    return spec.compile()
+            add_piece(spec, node, f"piece{number}_{k}", piece, touching)
 
 
-def _add_piece(spec: Any, node: Any, name: str, piece: NDArray, body: SolidBody) -> None:
+def add_piece(spec: Any, node: Any, name: str, piece: NDArray, touching: Touching) -> None:
+    """Adds a convex piece, corners (k, 3) [m] in the frame of its body `node`."""
     lower, upper = piece.min(axis=0), piece.max(axis=0)
     common = {
-        "density": body.density,
-        "friction": [body.friction, 0.005, 0.0001],
+        "name": name,
+        "density": touching.density,
+        "friction": [touching.friction, 0.005, 0.0001],
         "condim": 4,
+        "contype": touching.own,
+        "conaffinity": touching.others,
         "solref": [CONTACT_TIME_S, 1.0],
         "solimp": [0.95, 0.99, 0.0005, 0.5, 2.0],
     }

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from handey_studio.base import BadInput, Progress, Share
 from handey_studio.cell.protocol import CannotAct
-from handey_studio.cell.simulated import SimulatedCell
+from handey_studio.cell.simulated import SimulatedCell, simulated_cell
 from handey_studio.session.session import Session
 from handey_studio.task import MoveOptions, MoveResult, Station, check_command, execute_in, plan_in, sense
 from handey_studio.world import Library
@@ -73,4 +73,4 @@ def station_of(session: Session, library: Library) -> Station:
 def cell_of(session: Session, library: Library) -> SimulatedCell:
     """The simulated cell as the session's last execution left it."""
     workcell = session.workcell
-    return SimulatedCell(workcell if session.cell_now is None else replace(workcell, setup=session.cell_now), library)
+    return simulated_cell(workcell if session.cell_now is None else replace(workcell, setup=session.cell_now), library)

@@ -13,7 +13,7 @@ from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.checker import Violation, check_plan, names_in_plan
 from handey_studio.cell.piles import Pile, random_pile
-from handey_studio.cell.simulated import SimulatedCell
+from handey_studio.cell.simulated import SimulatedCell, simulated_cell
 from handey_studio.cell.solvable import solvable_move
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.task.move import MoveOptions
@@ -62,7 +62,7 @@ def _row(seed: int, pile: Pile, library: Library) -> dict[str, Any]:
     """One MOVE: planned from what is sensed, executed in the cell, then judged with the truth."""
     robot = library.robot(pile.workcell.robot)
     station = Station(pile.workcell, robot, tuple(library.part(name) for name in pile.workcell.parts))
-    cell = SimulatedCell(pile.workcell, library)
+    cell = simulated_cell(pile.workcell, library)
     before = cell.true_scene()
     begun = time.perf_counter()
     scene, result = run_move(station, cell, MoveCommand(pile.part, pile.to), MoveOptions(seed=seed))

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from handey_studio.cell.examples import figure1
-from handey_studio.cell.simulated import SimulatedCell
+from handey_studio.cell.geometric import GeometricCell
 from handey_studio.geometry.transforms import transform
 from handey_studio.motion import Trajectory
 from handey_studio.world import Library, Robot, arm_of, load_robot
@@ -88,8 +88,8 @@ def arms(robot) -> Arms:
 
 
 @pytest.fixture
-def cell(library, robot) -> SimulatedCell:
+def cell(library, robot) -> GeometricCell:
     """The Figure 1 cell, its arm turned from home to face the pile: straight joint lines from there pass over it."""
-    cell = SimulatedCell(figure1(), library)
+    cell = GeometricCell(figure1(), library)
     cell.follow(Trajectory(np.array([0.0, 2.0]), np.array([robot.home, AHEAD]), np.full(2, robot.hand.opening_max)))
     return cell

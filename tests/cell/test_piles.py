@@ -11,7 +11,7 @@ from handey_studio.cell.fitness import graspable, visible_share
 from handey_studio.cell.penetration import body_overlap
 from handey_studio.cell.physics import settle
 from handey_studio.cell.piles import PileOptions, destination, random_pile
-from handey_studio.cell.simulated import true_bodies
+from handey_studio.cell.truth import true_bodies
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse, pose_difference, transform
 from handey_studio.sensing.range_finder import RangeFinder

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from handey_studio.cell.checker import check_plan, names_in_plan
-from handey_studio.cell.simulated import SimulatedCell
+from handey_studio.cell.geometric import GeometricCell
 from handey_studio.geometry.transforms import inverse, pose_difference
 from handey_studio.localization import Rival
 from handey_studio.session import find_session, read_session
@@ -52,7 +52,7 @@ def planned(figure1):
 def test_both_l_blocks_are_located_within_the_play(figure1):
     assert len(figure1.scene.instances) == 2
     for placed in figure1.scene.instances:
-        metres, radians = pose_difference(placed.T_world_part, SimulatedCell.true_pose(figure1.cell, figure1.true_name(placed.name)))
+        metres, radians = pose_difference(placed.T_world_part, GeometricCell.true_pose(figure1.cell, figure1.true_name(placed.name)))
         assert metres < 0.001 and radians < np.deg2rad(0.5)
 
 

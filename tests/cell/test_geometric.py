@@ -5,8 +5,8 @@ import pytest
 
 from handey_studio.base import BadInput
 from handey_studio.cell.examples import figure1
+from handey_studio.cell.geometric import GeometricCell
 from handey_studio.cell.protocol import CannotAct, Cell
-from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.cell.workcell import SimulatedSetup, TrueBody, Workcell
 from handey_studio.geometry.transforms import from_xyz_rpy, pose_difference, transform
 from handey_studio.motion import Trajectory
@@ -16,7 +16,7 @@ from tests.cell.conftest import OPEN, over_l_block, raised
 GRASP_POINT = (0.0147, 0.015, 0.02)  # of the hooked L, in the corner of its foot and leg
 
 
-def lifted(cell: SimulatedCell, arms, name: str = "l_block#2", height: float = 0.12):
+def lifted(cell: GeometricCell, arms, name: str = "l_block#2", height: float = 0.12):
     """Grip a standing L from above and lift it; T_world_hand at the grip and the motion that lifted it."""
     T_hand = over_l_block(cell.true_pose(name), GRASP_POINT)
     above = arms.at(raised(T_hand, height), cell.joints())
@@ -36,7 +36,7 @@ def test_it_is_a_cell_and_says_that_it_has_no_physics(cell):
 
 
 def test_scans_are_repeatable_by_seed_and_differ_from_one_another(library):
-    first, second = (SimulatedCell(figure1(), library) for _ in range(2))
+    first, second = (GeometricCell(figure1(), library) for _ in range(2))
     a, b, c = first.scan().elevation, first.scan().elevation, second.scan().elevation
     assert np.array_equal(a, c, equal_nan=True)
     assert not np.array_equal(a, b, equal_nan=True)
@@ -72,7 +72,7 @@ def test_a_part_let_go_in_the_air_falls(cell, arms):
 def test_what_leaned_on_a_lifted_body_falls(library, arms):
     wall = TrueBody("wall", from_xyz_rpy((0.5, 0.0, 0.04)), size=np.array([0.03, 0.04, 0.08]))
     leaning = TrueBody("leaning", from_xyz_rpy((0.466, 0.0, 0.0345), (0.0, np.deg2rad(20), 0.0)), size=np.array([0.012, 0.03, 0.07]))
-    cell = SimulatedCell(Workcell(setup=SimulatedSetup((wall, leaning), drop=True)), library)
+    cell = GeometricCell(Workcell(setup=SimulatedSetup((wall, leaning), drop=True)), library)
     assert cell.true_pose("leaning")[2, 2] < 0.99
     T_hand = transform(np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]], float), cell.true_pose("wall")[:3, 3] + (0.0, 0, 0.02))
     above = arms.at(raised(T_hand, 0.1), cell.joints())
@@ -93,7 +93,7 @@ def test_a_guarded_motion_without_touch_runs_to_its_end(cell, arms):
 
 
 def test_the_bare_hand_feels_the_table(library, arms):
-    cell = SimulatedCell(Workcell(), library)
+    cell = GeometricCell(Workcell(), library)
     T_hand = transform(np.diag([1.0, -1.0, -1.0]), (0.45, 0.1, 0.05))
     above = arms.at(T_hand, cell.joints())
     cell.follow(arms.step("free", [cell.joints(), above], OPEN).motion)
@@ -107,12 +107,15 @@ def test_a_grip_on_nothing_reaches_what_was_asked(cell):
     assert not cell.finger_force() and cell.held_truly() is None
 
 
-def test_the_scan_leaves_out_what_the_hand_holds(cell, arms):
-    before = cell.scan().elevation
-    lifted(cell, arms)
+def test_the_scan_shows_the_arm_and_what_it_holds_where_they_stand_in_its_way(cell, arms, library):
+    before = GeometricCell(figure1(), library).scan().elevation
+    T_hand, up = lifted(cell, arms)
     after = cell.scan().elevation
-    assert (np.nan_to_num(before) - np.nan_to_num(after) > 0.04).sum() > 1500
-    assert (np.nan_to_num(after) - np.nan_to_num(before) > 0.06).sum() < 20
+    assert np.nanmax(after) > cell.true_pose("l_block#2")[2, 3] > np.nanmax(before)
+    cell.follow(arms.step("transfer", [up.q_rad[-1], arms.robot.home], OPEN).motion)
+    gone = cell.scan().elevation
+    assert (np.nan_to_num(before) - np.nan_to_num(gone) > 0.04).sum() > 1500
+    assert (np.nan_to_num(gone) - np.nan_to_num(before) > 0.06).sum() < 20
 
 
 def test_motions_that_an_arm_could_not_start_are_refused(cell, robot):
@@ -142,14 +145,14 @@ def test_a_setup_that_makes_no_sense_is_refused_in_a_sentence(library):
         ((TrueBody("a", np.eye(4), part="no such part"),), "not known"),
     ):
         with pytest.raises(BadInput, match=words):
-            SimulatedCell(Workcell(setup=SimulatedSetup(bodies)), library)
+            GeometricCell(Workcell(setup=SimulatedSetup(bodies)), library)
     with pytest.raises(BadInput, match="not known"):
-        SimulatedCell(Workcell(), library).true_pose("nobody")
+        GeometricCell(Workcell(), library).true_pose("nobody")
 
 
 def test_the_state_now_makes_the_same_cell_again(cell, library, arms):
     lifted(cell, arms)
     cell.grip(OPEN)
-    again = SimulatedCell(Workcell(setup=cell.setup_now()), library)
+    again = GeometricCell(Workcell(setup=cell.setup_now()), library)
     for body in cell.true_scene():
         assert np.array_equal(again.true_pose(body.name), body.T_world_body)
