@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.localization.shares import shared
-from handey_studio.localization.surface import LEAST_ROWS, Surface, camera_of, reading_sigma, unproject
+from handey_studio.localization.surface import LEAST_ROWS, Surface, reading_sigma, unproject
 from handey_studio.sensing.depth_view import DepthView
+from handey_studio.sensing.drawing import camera_of
 
 NONE, JUMP, CONVEX, CONCAVE = 0, 1, 2, 3
 KIND_NAMES = ("none", "jump", "convex", "concave")

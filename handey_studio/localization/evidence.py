@@ -10,6 +10,7 @@ from handey_studio.localization.segments import Linked
 from handey_studio.localization.shares import shared
 from handey_studio.localization.surface import Surface
 from handey_studio.sensing.depth_view import DepthView, Pinhole
+from handey_studio.sensing.drawing import project
 
 DIRECTIONS = 6  # sectors of edge directions in the image
 SECTOR = np.pi / DIRECTIONS
@@ -110,15 +111,6 @@ def _segment_directions(linked: Linked) -> NDArray:
     mean_u, mean_v = np.bincount(segment, u) / n, np.bincount(segment, v) / n
     du, dv = u - mean_u[segment], v - mean_v[segment]
     return 0.5 * np.arctan2(2 * np.bincount(segment, du * dv), np.bincount(segment, du * du) - np.bincount(segment, dv * dv))
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def project(x, y, z, camera):
-    """(u, v) [px] of a point in the sensor's frame."""
-    if camera[0] > 0.5:
-        return x * camera[1] + camera[3], y * camera[2] + camera[4]
-    near = 1.0 / z
-    return x * near * camera[1] + camera[3], y * near * camera[2] + camera[4]
 
 
 @njit(cache=True, error_model="numpy", inline="always")

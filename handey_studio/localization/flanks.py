@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from handey_studio.localization.surface import Camera, Noise, reading_sigma, unproject
+from handey_studio.localization.surface import Noise, reading_sigma, unproject
+from handey_studio.sensing.drawing import Camera
 
 COLUMNS = 64  # readings are taken from at most about this many places along a run
 FEW = 12  # readings; fewer do not make a plane

@@ -21,7 +21,8 @@ from handey_studio.localization.runs import (
     rough_plane,
     straight_run,
 )
-from handey_studio.localization.surface import Camera, reading_sigma
+from handey_studio.localization.surface import reading_sigma
+from handey_studio.sensing.drawing import Camera
 
 LEAST_TURN = np.deg2rad(10.0)  # between the planes beside a crease
 PLAIN_TURN, SURE_TURN = np.deg2rad(25.0), 2.0  # a turn that is less plain than this must stand out by these sigmas

@@ -12,9 +12,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.evidence import Evidence, ray_at
-from handey_studio.localization.render import draw, window
 from handey_studio.localization.shares import shared
 from handey_studio.localization.verify import GRAZING, LEAST_POSES, STEEP, turned
+from handey_studio.sensing.drawing import draw, window
 from handey_studio.world.part import Part
 
 NOISES = 3.5  # of a reading, within which it lies on a face

@@ -13,8 +13,9 @@ from handey_studio.localization.flanks import Seen
 from handey_studio.localization.lines import Line
 from handey_studio.localization.pieces import straight_lines
 from handey_studio.localization.runs import MIN_PIXELS
-from handey_studio.localization.surface import Surface, camera_of
+from handey_studio.localization.surface import Surface
 from handey_studio.sensing.depth_view import DepthView
+from handey_studio.sensing.drawing import camera_of
 
 MAX_TURN = np.deg2rad(30.0)  # a pixel's own direction against the segment's: pixel directions are rough
 SETTLED = 12  # pixels after which the line alone decides: at corners the pixels' own directions mix

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.localization.shares import shared
-from handey_studio.sensing.depth_view import DepthView, Orthographic, Pinhole
+from handey_studio.sensing.depth_view import DepthView
+from handey_studio.sensing.drawing import Camera, camera_of
 
 MAX_NORMAL_ERROR = 0.05  # rad; the window grows until the noise of a normal is below
 MAX_SLOPE = 2.7  # tan 70°: steeper surfaces return too few readings to be told from a jump
@@ -23,7 +24,6 @@ TYPICAL_READINGS = 30_000
 LEAST_ROWS = 32  # that are worth a share
 ONE_PLANE = 1.6  # sigmas rms about a plane, up to which it is taken to explain the whole window
 
-Camera = tuple[float, float, float, float, float]
 Noise = tuple[float, float]
 
 
@@ -76,13 +76,6 @@ def window_radius(noise: float, pixel: float) -> int:
         if noise / (0.58 * radius * pixel * (2 * radius + 1)) < MAX_NORMAL_ERROR:
             return radius
     return MAX_RADIUS_PX
-
-
-def camera_of(projection: Pinhole | Orthographic) -> Camera:
-    """What compiled code needs of a projection: 1 if parallel, scale x, scale y [px or px/m], cx, cy [px]."""
-    if isinstance(projection, Pinhole):
-        return 0.0, projection.fx, projection.fy, projection.cx, projection.cy
-    return 1.0, 1.0 / projection.pixel, 1.0 / projection.pixel, projection.cx, projection.cy
 
 
 @njit(cache=True, inline="always")

@@ -11,9 +11,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.edges import CONVEX
-from handey_studio.localization.evidence import KIND, Evidence, Limits, U, V, Z, in_image, nearest_edge, pixels_per_metre, project, ray_at
+from handey_studio.localization.evidence import KIND, Evidence, Limits, U, V, Z, in_image, nearest_edge, pixels_per_metre, ray_at
 from handey_studio.localization.samples import ALONG, INTO_LEFT, INTO_RIGHT, LEFT, RIGHT, PartSamples
 from handey_studio.localization.shares import shared
+from handey_studio.sensing.drawing import project
 
 ON, HIDDEN, THROUGH, UNKNOWN = 0, 1, 2, 3
 GRAZING = 0.12  # cosine; a face seen more edge-on than this gives no readings to count on

@@ -11,12 +11,12 @@ from handey_studio.geometry.transforms import from_xyz_rpy, inverse, rotation_an
 from handey_studio.localization import LocateOptions, localize
 from handey_studio.localization.edges import edge_pixels
 from handey_studio.localization.evidence import evidence_of, limits_of
-from handey_studio.localization.render import rendered_depth
 from handey_studio.localization.samples import part_samples
 from handey_studio.localization.segments import link
 from handey_studio.localization.surface import surface_of
 from handey_studio.localization.verify import verify
 from handey_studio.sensing.depth_view import DepthView
+from handey_studio.sensing.drawing import rendered_depth
 from handey_studio.world.model_files import read_part
 from handey_studio.world.part import Part
 from tests.localization.rendering import looking_at, map_from_above, oblique_view, resting_poses
