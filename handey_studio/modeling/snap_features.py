@@ -58,7 +58,7 @@ def corners_of(
     scans: tuple[Scan, ...], Ts_model_scan: tuple[NDArray, ...], patches: tuple[Patches | None, ...], solid: Polyhedron | None
 ) -> Features:
     """The solid's corners, and those of the patches' outlines between two real edges."""
-    vertices = () if solid is None else solid.vertices
+    vertices = solid.vertices if solid is not None else ()
     rows = [_Row(vertex, vertex, MODEL, k, f"corner {k} of the model") for k, vertex in enumerate(vertices)]
     for k, scan, patch, T in _patches(scans, Ts_model_scan, patches):
         for ring, borders in zip(patch.rings, patch.borders, strict=True):
@@ -73,9 +73,8 @@ def edges_of(
     scans: tuple[Scan, ...], Ts_model_scan: tuple[NDArray, ...], patches: tuple[Patches | None, ...], solid: Polyhedron | None
 ) -> Features:
     """The solid's edges, and the sides of the patches' outlines that are edges of the object."""
-    rows = []
-    for number, edge in enumerate(solid.edges if solid is not None else ()):
-        rows.append(_Row(solid.vertices[edge.start], solid.vertices[edge.end], MODEL, number, f"edge {number} of the model"))
+    ends = [solid.vertices[[edge.start, edge.end]] for edge in solid.edges] if solid is not None else ()
+    rows = [_Row(start, end, MODEL, number, f"edge {number} of the model") for number, (start, end) in enumerate(ends)]
     for k, scan, patch, T in _patches(scans, Ts_model_scan, patches):
         for ring, borders in zip(patch.rings, patch.borders, strict=True):
             corners = apply(T, ring)

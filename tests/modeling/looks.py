@@ -35,7 +35,8 @@ def scan_of(
     """The solids (corners in the world) on a table at z = 0, as seen from T_world_sensor; `noise` [m] along the sight."""
     meshes = [trimesh.Trimesh(solid.vertices, solid.triangles, process=False) for solid in solids]
     table = trimesh.creation.box((2.0, 2.0, 0.01), transform(translation=(0.0, 0.0, -0.005)))
-    mesh: trimesh.Trimesh = trimesh.util.concatenate([*meshes, table])
+    mesh = trimesh.util.concatenate([*meshes, table])
+    assert isinstance(mesh, trimesh.Trimesh)
     v, u = (axis.ravel().astype(float) for axis in np.mgrid[: shape[0], : shape[1]])
     near = projection.unproject(np.stack([u, v], axis=-1), np.full(u.shape, 0.01))
     far = projection.unproject(np.stack([u, v], axis=-1), np.ones(u.shape))
