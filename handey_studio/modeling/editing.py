@@ -5,14 +5,15 @@ meet there, so that right angles stay right. What would break the solid is refus
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handey_studio.base import BadInput, measured
+from handey_studio.base import BadInput, Value, measured
 from handey_studio.geometry import Edge, Polyhedron
 from handey_studio.geometry.transforms import rotation_about
-from handey_studio.modeling.planes import corners_on_planes, faces_at_corners, sound, told_point
+from handey_studio.modeling.planes import corners_on_planes, faces_at_corners, inherited, shrunk, sound, told_point
 
 PARALLEL_RAD = float(np.deg2rad(0.2))  # what the polyhedron itself takes for one plane
 LEAST_WAY_M = 1e-6
@@ -20,12 +21,20 @@ HALVINGS = 16  # finds how far a move can go, as a share of what was asked
 SOUND_HALVINGS = 7  # the same where each try takes ten times as long
 
 
-def moved_face(solid: Polyhedron, f: int, distance: float) -> Polyhedron:
+@dataclass(frozen=True, eq=False)
+class Change(Value):
+    """An edited solid, and for each of its faces the number of the face that it was before."""
+
+    solid: Polyhedron
+    came_from: tuple[int, ...]
+
+
+def moved_face(solid: Polyhedron, f: int, distance: float) -> Change:
     """The solid with face f moved along its normal by `distance` [m], outward when positive. Raises BadInput with the limit."""
     return _moved(solid, np.where(np.arange(len(solid.faces)) == f, distance, 0.0), "the face", abs(distance))
 
 
-def moved_edge(solid: Polyhedron, edge: Edge, way: ArrayLike) -> Polyhedron:
+def moved_edge(solid: Polyhedron, edge: Edge, way: ArrayLike) -> Change:
     """The solid with an edge moved by `way` (3,) [m], of which only what is across the edge counts. Raises BadInput with the limit."""
     along = solid.vertices[edge.end] - solid.vertices[edge.start]
     along = along / np.linalg.norm(along)
@@ -33,12 +42,12 @@ def moved_edge(solid: Polyhedron, edge: Edge, way: ArrayLike) -> Polyhedron:
     return _with_way(solid, [edge.left, edge.right], across, "the edge")
 
 
-def moved_corner(solid: Polyhedron, corner: int, way: ArrayLike) -> Polyhedron:
+def moved_corner(solid: Polyhedron, corner: int, way: ArrayLike) -> Change:
     """The solid with a corner moved by `way` (3,) [m]: all faces that meet there move along their normals. Raises BadInput."""
     return _with_way(solid, faces_at_corners(solid)[corner], np.asarray(way, dtype=float), "the corner")
 
 
-def with_distance(solid: Polyhedron, f: int, other: int, distance: float) -> Polyhedron:
+def with_distance(solid: Polyhedron, f: int, other: int, distance: float) -> Change:
     """The solid with face f moved until it is `distance` [m] from the parallel face `other`. Raises BadInput."""
     turn = float(np.arccos(np.clip(abs(solid.normals[f] @ solid.normals[other]), 0.0, 1.0)))
     if f == other or turn > PARALLEL_RAD:
@@ -50,7 +59,7 @@ def with_distance(solid: Polyhedron, f: int, other: int, distance: float) -> Pol
     return moved_face(solid, f, sense * (np.copysign(distance, now) - now))
 
 
-def with_length(solid: Polyhedron, edge: Edge, end: int, length: float) -> Polyhedron:
+def with_length(solid: Polyhedron, edge: Edge, end: int, length: float) -> Change:
     """The solid with an edge made `length` [m] long: the faces across its corner `end` move. Raises BadInput."""
     start = edge.start if end == edge.end else edge.end
     along = solid.vertices[end] - solid.vertices[start]
@@ -59,7 +68,7 @@ def with_length(solid: Polyhedron, edge: Edge, end: int, length: float) -> Polyh
     return _with_way(solid, across, along / now * (length - now), "the end of the edge")
 
 
-def with_angle(solid: Polyhedron, f: int, other: int, angle: float) -> Polyhedron:
+def with_angle(solid: Polyhedron, f: int, other: int, angle: float) -> Change:
     """The solid with face f turned about its edge with `other` until the inner angle there is `angle` [rad]. Raises BadInput."""
     edge = next((e for e in solid.edges if {e.left, e.right} == {f, other}), None)
     if edge is None:
@@ -79,14 +88,14 @@ def with_angle(solid: Polyhedron, f: int, other: int, angle: float) -> Polyhedro
     return _changed(solid, turned, "the face", "turn", abs(angle - now), "rad")
 
 
-def _with_way(solid: Polyhedron, faces: list[int], way: NDArray, what: str) -> Polyhedron:
+def _with_way(solid: Polyhedron, faces: list[int], way: NDArray, what: str) -> Change:
     """The solid with the planes of some faces moved so that what they share moves by `way` (3,) [m]."""
     moves = np.zeros(len(solid.faces))
     moves[faces] = solid.normals[faces] @ way
     return _moved(solid, moves, what, float(np.linalg.norm(way)))
 
 
-def _moved(solid: Polyhedron, moves: NDArray, what: str, distance: float) -> Polyhedron:
+def _moved(solid: Polyhedron, moves: NDArray, what: str, distance: float) -> Change:
     """The solid with each face moved along its normal by `moves` (m,) [m]."""
     if np.abs(moves).max() < LEAST_WAY_M:
         raise BadInput(f"{what} would not move; nothing would change.")
@@ -95,7 +104,7 @@ def _moved(solid: Polyhedron, moves: NDArray, what: str, distance: float) -> Pol
 
 def _changed(
     solid: Polyhedron, planes: Callable[[float], tuple[NDArray, NDArray]], what: str, verb: str, asked: float, unit: str
-) -> Polyhedron:
+) -> Change:
     """The solid with its faces in the planes that belong to share 1 of a change. Raises BadInput with the share that would be possible."""
     try:
         return _rebuilt(solid, *planes(1.0))
@@ -135,9 +144,13 @@ def _still(change: Callable[..., object], *given: object) -> bool:
     return True
 
 
-def _rebuilt(solid: Polyhedron, normals: NDArray, offsets: NDArray) -> Polyhedron:
+def _rebuilt(solid: Polyhedron, normals: NDArray, offsets: NDArray) -> Change:
     """The solid in other planes with the same neighbours. Raises BadInput."""
-    return sound(_corners(solid, normals, offsets), solid.faces)
+    corners = _corners(solid, normals, offsets)
+    changed = sound(corners, solid.faces)
+    left = [f for f, face in enumerate(solid.faces) if not shrunk(corners[list(face.outer)])]
+    drawn = Polyhedron(corners, tuple(solid.faces[f] for f in left))
+    return Change(changed, inherited(changed, [(drawn, left)], left[0]))
 
 
 def _corners(solid: Polyhedron, normals: NDArray, offsets: NDArray) -> NDArray:

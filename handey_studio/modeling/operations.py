@@ -107,13 +107,15 @@ class Box(Operation):
 class Sketch(Operation):
     """An outline on a plane, under a name that later steps use; the same name again takes the older one's place.
 
-    `T_model_plane` (4, 4): x and y in the plane, z its normal.
+    `T_model_plane` (4, 4): x and y in the plane, z its normal. With `on` the plane is that of a face of the solid: it stays with the face
+    when earlier steps are edited.
     """
 
     kind: ClassVar[str] = "sketch"
     name: str
     T_model_plane: NDArray
     outline: Outline
+    on: FaceAt | None = None
 
     def __post_init__(self) -> None:
         keep(self, "T_model_plane", numbers(self.T_model_plane, (4, 4), "the plane of a sketch"))

@@ -6,6 +6,7 @@ they are linear, as horizontal, vertical and snapped ones are, one step is exact
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -72,7 +73,7 @@ def sound_corners(outline: Outline) -> NDArray:
 def _crossing(polygon: shapely.Polygon) -> str:
     """Which two sides cross, in words."""
     corners = shapely.get_coordinates(polygon)
-    sides = [shapely.LineString(pair) for pair in zip(corners[:-1], corners[1:], strict=True)]
+    sides = [shapely.LineString(pair) for pair in pairwise(corners)]
     n = len(sides)
     for i in range(n):
         for j in range(i + 2, n - (i == 0)):

@@ -108,6 +108,12 @@ def inherited(solid: Polyhedron, parents: Sequence[tuple[Polyhedron, Sequence[La
     return tuple(_label_of(solid, f, parents, otherwise) for f in range(len(solid.faces)))
 
 
+def shrunk(corners: NDArray) -> bool:
+    """Whether an outline (n, 3) [m] has shrunk to a line or a point."""
+    area = 0.5 * np.linalg.norm(np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0))
+    return bool(area <= SAME_M * np.ptp(corners, axis=0).max())
+
+
 def told_point(point: NDArray) -> str:
     """A place in mm, as it is read on screen."""
     return f"({', '.join(f'{1e3 * x + 0.0:.1f}' for x in np.round(point, 4))}) mm"
@@ -121,7 +127,7 @@ def _label_of(solid: Polyhedron, f: int, parents: Sequence[tuple[Polyhedron, Seq
         close = np.abs(parent.normals @ point - parent.offsets) < SAME_M
         for g in np.flatnonzero(close & (np.abs(parent.normals @ solid.normals[f]) > SAME_DIRECTION)):
             if parent.face_polygon(int(g), T).buffer(SAME_M).contains(inside):
-                return labels[g]
+                return labels[int(g)]
     return otherwise
 
 
@@ -146,7 +152,7 @@ def _without_repeats(loop: list[int]) -> list[int]:
 def _polygons(vertices: NDArray, face: Face) -> list[list[int]]:
     """A face as polygons without holes. Raises BadInput when its outline crosses itself."""
     corners = vertices[list(face.outer)]
-    if np.linalg.norm(np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)) < 2.0 * SAME_M * np.ptp(corners, axis=0).max():
+    if shrunk(corners):
         return _flat_fan(vertices, face.outer)
     alone = Polyhedron(vertices, (face,))
     if not alone.face_polygon(0, alone.face_frame(0)).is_valid:
