@@ -13,7 +13,8 @@ class Border:
     """What one side of a patch's outline is.
 
     `kind`: "crease" (meets patch `other` there), "foot" (meets the support), "rim" (the object ends: what lies behind is farther),
-    "cut" (a nearer thing hides the rest), "image" (the view or its readings end). `sigma` [m] tells how well it is known sideways.
+    "cut" (a nearer thing hides the rest), "image" (the view or its readings end). At a rim or a cut `other` is the patch beyond it, or -1.
+    `sigma` [m] tells how well a rim or a cut is known sideways, 0 where planes tell it.
     """
 
     kind: str
@@ -27,8 +28,9 @@ class Patch(Value):
 
     On the plane `normal` · x = `offset` [m], the unit normal (3,) towards the sensor. `rings`: the outline (n, 3) [m] with straight
     sides, counter-clockwise seen from outside, then holes, clockwise. `borders` has one `Border` for each side of each ring, the one that
-    starts at that corner. `rms` [m] of its `readings` off the plane, `area` [m²] inside the outline, `tilt` [rad]: so much may the
-    normal be off. `object` is the number in `Patches.objects`.
+    starts at that corner. `rms` [m] of its `readings` off the plane, `area` [m²] inside the outline. `bend` [m]: how far the means over
+    its parts lie off the plane, as cartons bulge and sensors warp; `tilt` [rad]: so much may its normal be off therefore. `object` is the
+    number in `Patches.objects`.
     """
 
     number: int
@@ -39,6 +41,7 @@ class Patch(Value):
     rms: float
     area: float
     readings: int
+    bend: float
     tilt: float
     object: int
 

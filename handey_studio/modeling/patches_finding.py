@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt, find_objects
 
 from handey_studio.geometry.transforms import apply
-from handey_studio.modeling.patches import Crease, Patch, Patches
+from handey_studio.modeling.patches import Border, Crease, Patch, Patches
 from handey_studio.modeling.patches_bodies import bodies_of, creases_of
 from handey_studio.modeling.patches_growing import Camera, grown, normals_of, planes_of
 from handey_studio.modeling.patches_outlines import SUPPORT, Seen, area_of, lost_at_rims, outlines_of
@@ -19,6 +19,7 @@ from handey_studio.sensing.facets import sigma_at
 ON_SUPPORT_SIGMAS = 4.5
 INNER_PX = 2  # beside edges sensors smooth: planes are fitted without them where enough is left
 INNER_SHARE = 0.4
+PARTS = 6  # a patch is cut into so many along each way to see how it bends
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def _inner_planes(field: Field, labels: NDArray) -> NDArray:
         inside = np.pad(labels[part] == k, 1)
         core = binary_erosion(inside, np.ones((3, 3)), INNER_PX)
         use = core if core.sum() > INNER_SHARE * inside.sum() else inside
-        inner[part][use[1:-1, 1:-1]] = k
+        np.copyto(inner[part], k, where=use[1:-1, 1:-1])
     return planes_of(field, inner, int(labels.max()) + 1)
 
 
@@ -131,22 +132,27 @@ def _told(view: DepthView, labels: NDArray, planes: NDArray, sigma: NDArray, poi
     patches = []
     for new, k in enumerate(kept):
         on = points[labels == new]
-        off = on @ planes[k, :3] - planes[k, 3]
-        rms = float(np.sqrt(np.mean(off**2)))
         rings = [outline.ring for outline in outlines[k]]
         borders = tuple(
-            tuple(type(b)(b.kind, int(number[b.other]) if b.other >= 0 else b.other, b.sigma) for b in outline.borders)
+            tuple(Border(b.kind, int(number[b.other]) if b.other >= 0 else b.other, b.sigma) for b in outline.borders)
             for outline in outlines[k]
         )
-        tilt = 2.0 * rms / max(_width(on, planes[k, :3]), 1e-6)
+        rms, bend, tilt = _flatness(on, planes[k])
         area = area_of(rings, planes[k, :3])
-        patches.append(Patch(new, planes[k, :3], float(planes[k, 3]), tuple(rings), borders, rms, area, len(on), tilt, owner[new]))
+        patches.append(Patch(new, planes[k, :3], float(planes[k, 3]), tuple(rings), borders, rms, area, len(on), bend, tilt, owner[new]))
     return Patches(labels, tuple(patches), objects, creases)
 
 
-def _width(points: NDArray, normal: NDArray) -> float:
-    """The smaller extent [m] of points (n, 3) on a plane, as a rectangle's of their spread."""
-    spread = points - points.mean(axis=0)
-    spread = spread - (spread @ normal)[:, None] * normal
-    values = np.linalg.eigvalsh(spread.T @ spread / len(points))
-    return float(np.sqrt(12.0 * max(values[1], 0.0)))
+def _flatness(points: NDArray, plane: NDArray) -> tuple[float, float, float]:
+    """The rms [m] of points (n, 3) off a plane, that of the means over its parts, and the tilt [rad] that such means may hide."""
+    off = points @ plane[:3] - plane[3]
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd((points - middle)[:: max(1, len(points) // 500)], full_matrices=False)[2]
+    across = (points - middle) @ axes[:2].T
+    low, size = across.min(axis=0), np.maximum(np.ptp(across, axis=0), 1e-9)
+    part = np.minimum((across - low) / size * PARTS, PARTS - 1).astype(int) @ (PARTS, 1)
+    count = np.bincount(part, minlength=PARTS**2)
+    means = np.bincount(part, off, PARTS**2)[count > 0] / count[count > 0]
+    rms, bend = float(np.sqrt(np.mean(off**2))), float(np.sqrt(np.average(means**2, weights=count[count > 0])))
+    width = np.sqrt(12.0) * float(across[:, 1].std())
+    return rms, bend, float(np.sqrt(12.0) * bend / max(width, 1e-6))

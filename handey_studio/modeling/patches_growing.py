@@ -200,7 +200,7 @@ def _merged(field: Field, labels: NDArray, count: int, camera: Camera) -> NDArra
         touched = {x if y in (a, b) else y for x, y in likeness if (x in (a, b)) != (y in (a, b))}
         likeness = {pair: value for pair, value in likeness.items() if a not in pair and b not in pair}
         likeness |= {(min(a, k), max(a, k)): _likeness(sums, planes, normals, min(a, k), max(a, k), sigma) for k in touched}
-    kept, numbers = np.unique(root, return_inverse=True)
+    numbers = np.unique(root, return_inverse=True)[1]
     return np.where(labels >= 0, numbers.reshape(-1)[labels], -1).astype(np.int32)
 
 

@@ -21,6 +21,7 @@ SIMPLE_PX, RAGGED = 1.5, 1.2  # a contour's side may leave a straight line by so
 COARSER = (1.0, 1.6, 2.5)  # times as much where the sides would cross one another
 SHORT = 3.5  # slacks: a shorter side may be a rounded corner
 MEET_SLACKS, MEET_PX = 6.0, 8.0  # lines that meet farther from their corner do not make it
+LOST_UNSURE = 0.35  # what a sensor loses at rims is known to so much of it
 TRIM = 0.12  # of a side at each end belongs to the corner
 SAME_SURFACE_SIGMAS = 6.0
 NEAR_CREASE_PX = 5.0  # a crease that the planes put farther from the contour is not used
@@ -67,7 +68,7 @@ def outlines_of(seen: Seen, number: int) -> list[Outline]:
         return []
     outer = max((k for k in range(len(contours)) if tree[0][k][3] < 0), key=lambda k: cv2.contourArea(contours[k]))
     chosen = [outer, *(k for k in range(len(contours)) if tree[0][k][3] == outer and _is_hole(seen, contours[k], left, top))]
-    found = [_outline(seen, number, contours[k][:, 0].astype(float) + (left, top), k != outer) for k in chosen]
+    found = [_outline(seen, number, contours[k][:, 0] + np.array([left, top], float), k != outer) for k in chosen]
     return [outline for outline in found if outline is not None] if found[0] is not None else []
 
 
@@ -164,7 +165,7 @@ def _beyond(seen: Seen, number: int, contour: NDArray) -> tuple[NDArray, NDArray
     label = seen.labels[vv, uu]
     near = np.abs(depth - edge) < np.maximum(slope, SAME_SURFACE_SIGMAS * sigma + np.abs(expected - edge))
     kind = np.where(near, np.where(label == SUPPORT, "f", np.where(label >= 0, "c", "u")), np.where(depth > edge, "r", "k"))
-    kinds[rows], others[rows] = kind, np.where(near & (label >= 0), label, -1)
+    kinds[rows], others[rows] = kind, np.where(label >= 0, label, -1)
     return kinds, others
 
 
@@ -173,7 +174,9 @@ def _side(
 ) -> tuple[Border, tuple[NDArray, NDArray]]:
     """What one side is, and its line in the image: a point and a unit direction [px]."""
     middle, along, off = _line(contour)
-    sigma = max(off, 0.3) / np.sqrt(max(len(contour) / 6.0, 1.0)) / pixels_per_m
+    outward = np.array([along[1], -along[0]])
+    per_px = _metres_across(seen, number, middle, along, outward)
+    sigma_px = max(off, 0.3) / np.sqrt(max(len(contour) / 6.0, 1.0))
     kind = max("rcfkiu", key=lambda k: (kinds == k).sum())
     if kind in "cf":
         other = int(np.bincount(others[kinds == "c"]).argmax()) if kind == "c" else SUPPORT
@@ -181,12 +184,22 @@ def _side(
         if crease is not None:
             return Border("crease" if kind == "c" else "foot", other), crease
         kind = "u"
-    if kind in "ri":
-        outward = np.array([along[1], -along[0]])
-        middle = middle + outward * (seen.lost_m * pixels_per_m) * _outward_sign(seen, number, middle, outward)
+    if kind in "riu":
+        lost_px = seen.lost_m * pixels_per_m
+        middle = middle + outward * lost_px * _outward_sign(seen, number, middle, outward)
+        sigma_px = float(np.hypot(sigma_px, LOST_UNSURE * lost_px))
     names = {"r": "rim", "k": "cut", "i": "image", "u": "rim"}
-    sigma = float(np.hypot(sigma, 0.35 * seen.lost_m)) if kind != "k" else sigma
-    return Border(names[kind], -1, sigma), (middle, along)
+    beyond = others[kinds == kind]
+    other = int(np.bincount(beyond[beyond >= 0]).argmax()) if kind in "rk" and (beyond >= 0).mean() > 0.5 else -1
+    return Border(names.get(kind, "rim"), other, sigma_px * per_px), (middle, along)
+
+
+def _metres_across(seen: Seen, number: int, middle: NDArray, along: NDArray, outward: NDArray) -> float:
+    """How far [m] a side moves on the patch's plane when its image moves by a pixel."""
+    start, ahead, aside = _lifted(seen, number, np.stack([middle, middle + along, middle + outward]))
+    direction = (ahead - start) / max(float(np.linalg.norm(ahead - start)), 1e-12)
+    across = aside - start - ((aside - start) @ direction) * direction
+    return float(np.linalg.norm(across))
 
 
 def _outward_sign(seen: Seen, number: int, middle: NDArray, outward: NDArray) -> float:
@@ -229,7 +242,7 @@ def _line(points: NDArray) -> tuple[NDArray, NDArray, float]:
     """Middle, unit direction and rms [px] of the line through points (n, 2), those far off left out."""
     for _ in range(3):
         middle = points.mean(axis=0)
-        _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
+        axes = np.linalg.svd(points - middle, full_matrices=False)[2]
         off = (points - middle) @ np.array([-axes[0, 1], axes[0, 0]])
         keep = np.abs(off) <= max(2.5 * off.std(), 0.6)
         if keep.all() or keep.sum() < 3:

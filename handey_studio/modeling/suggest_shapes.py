@@ -1,0 +1,267 @@
+"""Closed solids that an object may be: cuboids, prisms on each face seen, and columns under all faces that look up."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import manifold3d
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from handey_studio.base import BadInput
+from handey_studio.geometry import Polyhedron, polyhedron_from_polygons, prism
+from handey_studio.geometry.transforms import apply, transform
+from handey_studio.modeling.suggest_planes import UP, Body, BodyPlane, Clue
+
+ALONG = np.cos(np.deg2rad(1.0))  # planes along an axis
+LEAST_THICK_M = 0.002
+SEEN_WORTH = 3.0  # a face that is seen tells three times as much as a rim of that length
+SHORT_SIGMAS, SHORT_PX_M = 3.0, 0.004  # shorter sides of an outline are the sensor's
+INTO_M = 0.001  # columns reach into higher ones beside them
+MOST_ENDS = 3
+
+
+class Shape(NamedTuple):
+    """A candidate: `option` names it; `solid` None if it cannot be, with the `reason` and number."""
+
+    option: str
+    solid: Polyhedron | None
+    reason: str = ""
+    value: float | None = None
+    limit: float | None = None
+    unit: str = ""
+
+
+class Line(NamedTuple):
+    """A side of a flat outline: outward · x = offset [m] in the cap's plane, `length` [m]; `cut` if a nearer thing hides what is beyond."""
+
+    outward: NDArray
+    offset: float
+    length: float
+    sigma: float
+    cut: bool
+
+
+def shapes_of(body: Body, clues: Sequence[Clue], planes: Sequence[BodyPlane], frame: NDArray, short: float) -> Iterator[Shape]:
+    """All candidates for an object; `short` [m]: outlines' sides below are the sensor's raggedness."""
+    yield cuboid(planes, frame)
+    caps = [clue for clue in clues if clue.kind == "seen"]
+    most = max((clue.size for clue in caps), default=0.0)
+    for cap in caps:
+        if cap.size > 0.25 * most:
+            yield from prisms(body, cap, clues, planes, short)
+    upward = [cap for cap in caps if cap.normal @ UP > 0.2]
+    if upward and (len(upward) > 1 or upward[0].normal @ UP < ALONG):
+        yield columns(body, upward, clues, planes, short)
+
+
+def cuboid(planes: Sequence[BodyPlane], frame: NDArray) -> Shape:
+    """The cuboid between the surest planes along the six directions of the frame."""
+    ends = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            direction = sign * frame[axis]
+            along = [plane for plane in planes if plane.normal @ direction > ALONG and (plane.size > 0 or plane.kind == "support")]
+            if not along:
+                return Shape("cuboid", None, f"nothing shows where it ends along {_named(direction)}")
+            ends.append(max(along, key=_worth).offset)
+    size = np.array([ends[0] + ends[1], ends[2] + ends[3], ends[4] + ends[5]])
+    if size.min() < LEAST_THICK_M:
+        return Shape("cuboid", None, "it would be too thin", float(size.min()), LEAST_THICK_M, "m")
+    T = transform(frame.T, frame.T @ [0.5 * (ends[0] - ends[1]), 0.5 * (ends[2] - ends[3]), -ends[5]])
+    half = 0.5 * size[:2]
+    flat = prism([[-half[0], -half[1]], [half[0], -half[1]], [half[0], half[1]], [-half[0], half[1]]], size[2])
+    return Shape("cuboid", Polyhedron(apply(T, flat.vertices), flat.faces))
+
+
+def _worth(plane: BodyPlane) -> tuple[bool, float]:
+    """How much speaks for an end: of what it may stand on the highest, else faces and rims by their size."""
+    if plane.kind == "support":
+        return True, -plane.offset
+    return False, plane.size * (SEEN_WORTH if plane.kind == "seen" else 1.0)
+
+
+def _named(direction: NDArray) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.2f}" for value in direction) + ")"
+
+
+def prisms(body: Body, cap: Clue, clues: Sequence[Clue], planes: Sequence[BodyPlane], short: float) -> Iterator[Shape]:
+    """A seen face extruded back to each plane where the object may end."""
+    option = f"face {cap.of[1] + 1} of scan {cap.of[0] + 1}"
+    top = _plane_with(planes, cap.of)
+    ends = [plane for plane in planes if plane.normal @ cap.normal < -ALONG and top.offset + plane.offset > LEAST_THICK_M]
+    if not ends:
+        yield Shape(f"{option} extruded", None, "nothing shows how far it reaches back")
+        return
+    basis = _basis(cap.normal)
+    rings = [_regular(_lines(body, cap, ring, planes, basis), short) for ring in range(len(body.patch(cap.of).rings))]
+    for end in sorted(ends, key=_worth, reverse=True)[:MOST_ENDS]:
+        depth = top.offset + end.offset
+        yield _extruded(f"{option} extruded by {1e3 * depth:.1f} mm", rings, basis, top.offset, depth)
+
+
+def _extruded(option: str, rings: list[list[Line]], basis: NDArray, offset: float, depth: float) -> Shape:
+    cut = [line for line in rings[0] if line.cut]
+    if cut:
+        return Shape(option, None, "the face is cut off by a nearer thing", max(line.length for line in cut), 0.0, "m")
+    polygon = _polygon(rings)
+    if polygon is None:
+        return Shape(option, None, "its outline has no simple polygon")
+    try:
+        solid = _prism(polygon, depth)
+    except BadInput as error:
+        return Shape(option, None, str(error).rstrip("."))
+    T = transform(basis, basis[:, 2] * (offset - depth))
+    return Shape(option, Polyhedron(apply(T, solid.vertices), solid.faces))
+
+
+def _basis(normal: NDArray) -> NDArray:
+    """A rotation (3, 3) whose third column is the normal."""
+    x = np.cross(UP, normal) if abs(normal @ UP) < 0.9 else np.array([1.0, 0.0, 0.0])
+    x = x - (x @ normal) * normal
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(normal, x), normal], axis=1)
+
+
+def _plane_with(planes: Sequence[BodyPlane], of: tuple[int, int]) -> BodyPlane:
+    return next(plane for plane in planes if of in plane.of)
+
+
+def _lines(body: Body, cap: Clue, ring: int, planes: Sequence[BodyPlane], basis: NDArray) -> list[Line]:
+    """The sides of one ring of a cap's outline in its plane; where the object has a plane for a side, on that plane."""
+    patch, T = body.patch(cap.of), body.Ts_model_scan[cap.of[0]]
+    corners = apply(T, patch.rings[ring]) @ basis
+    out = []
+    for s, border in enumerate(patch.borders[ring]):
+        start, end = corners[s, :2], corners[(s + 1) % len(corners), :2]
+        length = float(np.linalg.norm(end - start))
+        if length < 1e-6:
+            continue
+        outward = np.array([end[1] - start[1], start[0] - end[0]]) / length
+        offset = float(outward @ (0.5 * (start + end)))
+        plane = _plane_of_side(body, cap, ring, s, planes)
+        if plane is not None and abs(plane.normal @ basis[:, 2]) < 0.02:
+            flat = plane.normal @ basis[:, :2]
+            if flat @ outward > 0.9:
+                outward, offset = flat / np.linalg.norm(flat), plane.offset / float(np.linalg.norm(flat))
+        out.append(Line(outward, offset, length, border.sigma, border.kind in ("cut", "image")))
+    return out
+
+
+def _plane_of_side(body: Body, cap: Clue, ring: int, side: int, planes: Sequence[BodyPlane]) -> BodyPlane | None:
+    border = body.patch(cap.of).borders[ring][side]
+    scan = cap.of[0]
+    if border.kind == "crease":
+        return next((plane for plane in planes if (scan, border.other) in plane.of), None)
+    if border.kind == "foot":
+        return next((plane for plane in planes if (scan, -1) in plane.of), None)
+    return next((plane for plane in planes if (*cap.of, ring, side) in plane.sides), None)
+
+
+def _regular(lines: list[Line], short: float) -> list[Line]:
+    """Sides without the sensor's raggedness: short ones left out, those on one line made one."""
+    lines = list(lines)
+    while len(lines) > 3:
+        n = len(lines)
+        joined = next((k for k in range(n) if _on_one_line(lines[k - 1], lines[k], short)), None)
+        if joined is not None:
+            lines[joined - 1] = _mean(lines[joined - 1], lines[joined])
+            lines.pop(joined)
+            continue
+        shortest = min(range(n), key=lambda k: lines[k].length)
+        if lines[shortest].length > short:
+            break
+        lines.pop(shortest)
+    return lines
+
+
+def _on_one_line(one: Line, other: Line, short: float) -> bool:
+    alike = one.outward @ other.outward > (0.999 if min(one.length, other.length) > 2.0 * short else 0.94)
+    return bool(alike and abs(one.offset - other.offset) < short)
+
+
+def _mean(one: Line, other: Line) -> Line:
+    """The longer side's direction; a side that planes tell wins."""
+    first, second = sorted((one, other), key=lambda line: (line.sigma > 0, -line.length))
+    if first.sigma == 0 or second.outward @ first.outward < 0.999 or second.length < 0.3 * first.length:
+        return first._replace(length=one.length + other.length, cut=one.cut and other.cut)
+    offset = float(np.average([one.offset, other.offset], weights=[one.length, other.length]))
+    return Line(first.outward, offset, one.length + other.length, min(one.sigma, other.sigma), one.cut and other.cut)
+
+
+def _corners(lines: list[Line]) -> NDArray | None:
+    """Where neighbouring sides meet (n, 2); None where they do not."""
+    corners = []
+    for k in range(len(lines)):
+        one, two = lines[k - 1], lines[k]
+        cross = one.outward[0] * two.outward[1] - one.outward[1] * two.outward[0]
+        if abs(cross) < 0.05:
+            return None
+        corners.append(np.linalg.solve(np.stack([one.outward, two.outward]), [one.offset, two.offset]))
+    return np.array(corners)
+
+
+def _polygon(rings: list[list[Line]]) -> shapely.Polygon | None:
+    outlines = [_corners(ring) if len(ring) > 2 else None for ring in rings]
+    if outlines[0] is None:
+        return None
+    polygon = shapely.Polygon(outlines[0], [hole for hole in outlines[1:] if hole is not None])
+    return shapely.geometry.polygon.orient(polygon) if polygon.is_valid and polygon.area > 0 else None
+
+
+def _prism(polygon: shapely.Polygon, height: float) -> Polyhedron:
+    """A polygon with holes extruded from z = 0 [m]."""
+    loops = [np.asarray(ring.coords)[:-1] for ring in (polygon.exterior, *polygon.interiors)]
+    if len(loops) == 1:
+        return prism(loops[0], height)
+    section = manifold3d.CrossSection([np.array(loops[0])])
+    for hole in loops[1:]:
+        section = section - manifold3d.CrossSection([np.array(hole[::-1])])
+    return _solid_of(manifold3d.Manifold.extrude(section, height))
+
+
+def _solid_of(made: manifold3d.Manifold) -> Polyhedron:
+    mesh = made.to_mesh64()
+    return polyhedron_from_polygons(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).tolist())
+
+
+def columns(body: Body, upward: Sequence[Clue], clues: Sequence[Clue], planes: Sequence[BodyPlane], short: float) -> Shape:
+    """All that stands below the faces that look up, down to the support."""
+    option = f"columns under {len(upward)} faces"
+    made = manifold3d.Manifold()
+    for cap in upward:
+        lines = _regular(_stepped(body, cap, _lines(body, cap, 0, planes, _basis(cap.normal)), planes), short)
+        if any(line.cut for line in lines):
+            return Shape(
+                option, None, f"face {cap.of[1] + 1} is cut off by a nearer thing", max(x.length for x in lines if x.cut), 0.0, "m"
+            )
+        polygon = _polygon([lines])
+        if polygon is None:
+            return Shape(option, None, f"the outline of face {cap.of[1] + 1} has no simple polygon")
+        made = made + _column(polygon, cap, _plane_with(planes, cap.of))
+    try:
+        return Shape(option, _solid_of(made))
+    except BadInput as error:
+        return Shape(option, None, str(error).rstrip("."))
+
+
+def _stepped(body: Body, cap: Clue, lines: list[Line], planes: Sequence[BodyPlane]) -> list[Line]:
+    """Sides where a higher face of the same object hides nothing more than a step: they reach a little into that."""
+    borders = body.patch(cap.of).borders[0]
+    own = {patch for scan, patches in body.members if scan == cap.of[0] for patch in patches}
+    out = []
+    for line, border in zip(lines, borders, strict=False):
+        inside = border.other in own and (line.cut or border.kind == "crease")
+        out.append(line._replace(offset=line.offset + INTO_M, cut=False) if inside else line)
+    return out
+
+
+def _column(polygon: shapely.Polygon, cap: Clue, top: BodyPlane) -> manifold3d.Manifold:
+    """What lies straight below a polygon of the cap's plane, down to z = 0."""
+    basis = _basis(cap.normal)
+    corners = np.asarray(polygon.exterior.coords)[:-1]
+    points = np.c_[corners, np.full(len(corners), top.offset)] @ basis.T
+    flat = np.array(points[:, :2])
+    high = float(points[:, 2].max()) + 1.0
+    block = manifold3d.Manifold.extrude(manifold3d.CrossSection([flat]), high)
+    return block.trim_by_plane(tuple(-cap.normal), -top.offset)
