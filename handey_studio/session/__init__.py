@@ -3,10 +3,11 @@
 from handey_studio.session.checks import check_name, check_session
 from handey_studio.session.files import find_session, own_file, read_session, session_from_bytes, session_to_bytes, write_session
 from handey_studio.session.replay import Moment, Replay
-from handey_studio.session.session import LAYERS, Session, ViewState, new_session
+from handey_studio.session.session import LAYERS, CommandState, Session, ViewState, new_session
 
 __all__ = [
     "LAYERS",
+    "CommandState",
     "Moment",
     "Replay",
     "Session",

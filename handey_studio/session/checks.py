@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from handey_studio.base import BadInput
+from handey_studio.cell.recording import Recording
 from handey_studio.geometry import Polyhedron, polyhedron_from_polygons
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.grasping import ForbiddenRange
@@ -36,6 +37,8 @@ def check_session(session: Session) -> None:
             _check_map(path, value)
         elif isinstance(value, MovePlan):
             _check_plan(path, value)
+        elif isinstance(value, Recording):
+            _check_recording(path, value)
         elif isinstance(value, ForbiddenRange) and not -MOST_TURN <= value.low <= value.high <= MOST_TURN:
             raise BadInput(
                 f"{path} goes from {value.low:.3g} to {value.high:.3g} rad; angles go from -{MOST_TURN} to {MOST_TURN} rad, upwards."
@@ -65,6 +68,11 @@ def _check_counts(session: Session) -> None:
     for thing, count, limit in counts:
         if count > limit:
             raise BadInput(f"the session has {count} {thing}, the limit is {limit}.")
+    if session.states and len(session.states) != len(session.commands):
+        raise BadInput(f"the session has {len(session.states)} states for {len(session.commands)} commands; it needs one each, or none.")
+    for state in session.states:
+        if not -1 <= state.result < len(session.results):
+            raise BadInput(f"a command's state names result {state.result}; there are {len(session.results)}.")
     missing = sorted(set(session.workcell.parts) - {part.name for part in session.parts})
     if missing:
         raise BadInput(f"the session lacks the model of {', '.join(missing)}.")
@@ -117,6 +125,18 @@ def _check_map(path: str, scan: DepthMap) -> None:
         raise BadInput(f"{path} needs cells of up to {MAX_CELL_M * 1e3:.0f} mm and finite light heights.")
     if np.isinf(scan.elevation).any() or not np.isfinite([scan.noise, scan.outline_error]).all():
         raise BadInput(f"{path} holds an infinite elevation or error.")
+
+
+def _check_recording(path: str, recording: Recording) -> None:
+    """Every quantity must have one row a sample, and time must not run backwards."""
+    n, joints = len(recording.time_s), recording.q_rad.shape[1:]
+    wanted = {"time_s": (n,), "q_rad": (n, *joints), "q_command_rad": (n, *joints), "opening_m": (n,), "finger_force_N": (n,)}
+    wanted |= {"force_N": (n, 3), "torque_Nm": (n, 3)}
+    for name, shape in wanted.items():
+        if n == 0 or len(joints) != 1 or getattr(recording, name).shape != shape:
+            raise BadInput(f"{path}.{name} has the shape {getattr(recording, name).shape}; it needs one row for each of {n} samples.")
+    if (np.diff(recording.time_s) < 0).any():
+        raise BadInput(f"{path} has times that run backwards.")
 
 
 def _check_plan(path: str, plan: MovePlan) -> None:

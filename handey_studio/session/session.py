@@ -1,6 +1,7 @@
 """The Session value: everything a user did, from the workcell to the last plan, and how they were looking at it."""
 
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,13 +52,21 @@ class ViewState(Value):
         object.__setattr__(self, "camera_look_at", frozen_array(self.camera_look_at))
 
 
+@dataclass(frozen=True)
+class CommandState:
+    """How far a command of the session's list is. `result` counts the session's results, -1 while it has none."""
+
+    status: Literal["waiting", "running", "done", "failed", "skipped"] = "waiting"
+    result: int = -1
+
+
 @dataclass(frozen=True, eq=False)
 class Session(Value):
     """One working session, self-contained: it opens on a machine that lacks its parts.
 
     `parts` are the models that `workcell.parts` names. `scene` and `results` are what sensing and planning found,
-    empty before. `cell_now` is where the simulated bodies stand after what was executed, None while nothing was;
-    only the cell reads it.
+    empty before. `states` tells how far each of the commands is, one each, or none while they were never run as a list.
+    `cell_now` is where the simulated bodies stand after what was executed, None while nothing was; only the cell reads it.
     """
 
     name: str
@@ -67,6 +76,7 @@ class Session(Value):
     seed: int = 0
     scene: Scene | None = None
     results: tuple[MoveResult, ...] = ()
+    states: tuple[CommandState, ...] = ()
     cell_now: SimulatedSetup | None = None
     view: ViewState = field(default_factory=ViewState)
 
@@ -94,7 +104,7 @@ class Session(Value):
     def without_findings(self) -> "Session":
         """The session as before its first scan: what the user set stays, what was sensed and planned goes."""
         view = replace(self.view, time_s=0.0, hypothesis=-1, edge=-1, result=-1)
-        return replace(self, scene=None, results=(), cell_now=None, view=view)
+        return replace(self, scene=None, results=(), states=(), cell_now=None, view=view)
 
 
 def new_session(name: str, workcell: Workcell, library: Library, commands: tuple[MoveCommand, ...] = (), seed: int = 0) -> Session:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from handey_studio.base import Entry, Value, frozen_array
 from handey_studio.grasping import BumpRun, ForbiddenRange, Grip
 from handey_studio.motion import Certificate, CSpaceSummary
+from handey_studio.task.performance import Check, Incident, Performance, Recovery
 
 StepKind = Literal["free", "approach", "close", "lift", "transfer", "regrasp", "place", "open", "retreat"]
 
@@ -133,10 +134,21 @@ class MovePlan(Value):
 
 
 @dataclass(frozen=True, eq=False)
+class Attempt(Value):
+    """A plan that was carried out and did not end well: how it went, and what was decided then."""
+
+    plan: MovePlan
+    performance: Performance
+    recovery: Recovery
+
+
+@dataclass(frozen=True, eq=False)
 class MoveResult(Value):
     """What became of a MOVE. `ledger` holds everything that was tried; `timing_s` seconds a stage.
 
-    `T_world_part_start` and `T_world_part_goal` are known as soon as the part was located and the destination understood.
+    `T_world_part_start` and `T_world_part_goal` are known as soon as the part was located and the destination understood; `_reached` is
+    where the part was seen at the end, or by the arm's joints where it cannot be seen. `attempts` are those that did not end well, each
+    with its plan; `performance` is that of `plan`, None until it is carried out.
     """
 
     command: MoveCommand
@@ -149,3 +161,20 @@ class MoveResult(Value):
     ledger: tuple[Entry, ...] = ()
     timing_s: dict[str, float] = field(default_factory=dict)
     physics: bool = False
+    performance: Performance | None = None
+    attempts: tuple[Attempt, ...] = ()
+
+    @property
+    def performances(self) -> tuple[Performance, ...]:
+        """Every attempt's, in order."""
+        return (*(attempt.performance for attempt in self.attempts), *((self.performance,) if self.performance else ()))
+
+    @property
+    def incidents(self) -> tuple[Incident, ...]:
+        """Everything that was noticed, in order."""
+        return tuple(incident for performance in self.performances for incident in performance.incidents)
+
+    @property
+    def check(self) -> Check | None:
+        """What the last scan told of the part, None before it."""
+        return self.performance.check if self.performance else None

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Share
+from handey_studio.geometry.transforms import inverse
 from handey_studio.grasping import GraspPlane, LegalRotations, legal_rotations, rank_terms
 from handey_studio.task.carrying import Carried, Kept, Start, join, worst
 from handey_studio.task.detours import detours
@@ -22,6 +23,7 @@ from handey_studio.task.ends import PICKUP, PUTDOWN, End, pickup_end, putdown_en
 from handey_studio.task.grasps import Approach, Grasp, approach_at, fall_illegal, grasp_plane_at, grasps_at
 from handey_studio.task.options import Goal, Option, options_of
 from handey_studio.task.plan import Carry, MovePlan, Step
+from handey_studio.task.ruled_out import RuledOut, grasp_ruled_out, place_ruled_out, way_ruled_out
 from handey_studio.task.stages import APPROACH, DETOUR, PATHS, REACH, ROTATIONS, STAGES, STRAIGHT, left
 
 ANGLES = 4  # hand angles of one group that are looked at, the most vertical first
@@ -37,11 +39,13 @@ NEIGHBOUR_S = 1.0  # for each neighbour whose arm motion was not found
 @dataclass(frozen=True)
 class SearchOptions:
     """`effort` [s on an ordinary machine, by the constants of `stages`] is the work after which the search gives up; `improve` is how
-    many more whole plans are looked at once there is one; `regrasps` how often the part may be put down on the way."""
+    many more whole plans are looked at once there is one; `regrasps` how often the part may be put down on the way; `ruled_out` was carried
+    out before and failed."""
 
     effort: float = 40.0
     improve: int = 0
     regrasps: int = 2
+    ruled_out: tuple[RuledOut, ...] = ()
 
 
 class Route(NamedTuple):
@@ -97,6 +101,8 @@ class OptionSearch:
     def run(self, goals: list[Goal]) -> Iterator[MovePlan]:
         """Plans, the first one soon. Ends when nothing is left, when the effort is spent, or on cancel."""
         for goal in goals:
+            if self._falls(goal.entry, place_ruled_out(goal.T_world_goal, self.options.ruled_out)):
+                continue
             self._begin(Route((goal,)))
             self._detour(goal, detours(goal, self.options.regrasps, self.ledger), 0)
         while self._any() and self.spent < self.options.effort and not self.progress.cancelled:
@@ -129,6 +135,12 @@ class OptionSearch:
         expected = WORTH_S * cost + NEIGHBOUR_S * node.postponed + left(node.stage) + later * (left(ROTATIONS) + REGRASP_S)
         heappush(self._heap, (expected, self._pushed, node))
         self._pushed += 1
+
+    def _falls(self, entry: int, ruled_out: RuledOut | None) -> bool:
+        """Whether an option is ruled out; if so it falls."""
+        if ruled_out is not None:
+            self.ledger.fall(entry, f"ruled out: {ruled_out.why}")
+        return ruled_out is not None
 
     def _detour(self, goal: Goal, ways: Iterator[tuple[Goal, ...]], count: int) -> None:
         """One node stands for all the ways on which the part is put down; the next of them is worked out when it is its turn."""
@@ -180,6 +192,9 @@ class OptionSearch:
         option, rotations, angle = node.what
         entry = self.ledger.add("approach", f"hand at {np.rad2deg(angle - option.group.angle):+.0f}°", parent=node.entry)
         for grasp in grasps_at(option, rotations, self._way_in(option, rotations, angle), self._plane(option, 1), entry, self.ledger):
+            T_part_hand, symmetries = inverse(grasp.choice.T_hand_part), option.goal.instance.part.symmetries
+            if self._falls(grasp.entry, grasp_ruled_out(T_part_hand, symmetries, self.options.ruled_out)):
+                continue
             self._push(Node(REACH, node.route, grasp, node.cost, grasp.entry))
 
     def _way_in(self, option: Option, rotations: LegalRotations, angle: float) -> Approach:
@@ -232,7 +247,8 @@ class OptionSearch:
         entry = self.ledger.add("arm", f"branches {_degrees(pickup.q)} and {_degrees(putdown.q)}", parent=node.entry)
         share = Share(self.progress, min(self.spent / self.options.effort, 0.99), 1.0)
         carried = join(grasp, pickup, putdown, start, last, self._kept, entry, self.ledger, share, self.rng)
-        if carried is None:
+        ways = [way_ruled_out(step.q_rad, self.options.ruled_out) for step in carried.steps] if carried else []
+        if carried is None or self._falls(entry, next(filter(None, ways), None)):
             self._lost.append(_joint_key(node))
             return None
         done = route._replace(done=(*route.done, carried))
