@@ -50,13 +50,13 @@ def replayed(state: State, operations: tuple[Operation, ...]) -> Built:
     """The operations run from a state on."""
     steps = []
     for number, operation in enumerate(operations):
-        state, reason = _outcome(state, operation)
+        state, reason = outcome(state, operation)
         steps.append(Step(number, operation.kind, operation.told, reason))
     return Built(**state.fields, steps=tuple(steps))
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _outcome(state: State, operation: Operation) -> tuple[State, str | None]:
+def outcome(state: State, operation: Operation) -> tuple[State, str | None]:
     """The state after an operation and None, or the state as it was and why the operation fell."""
     try:
         return applied(operation, state).after_step(), None

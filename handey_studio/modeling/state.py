@@ -48,6 +48,11 @@ class State(Value):
         """The poses (4, 4) of the scans that are aligned, by name."""
         return dict(self.poses)
 
+    @property
+    def state(self) -> "State":
+        """The bare state, without what a `Built` adds."""
+        return State(**self.fields)
+
     def after_step(self) -> "State":
         """The same, one step later."""
         return replace(self, count=self.count + 1)
