@@ -11,6 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from handey_studio.base import BadInput, Value, frozen_array
+from handey_studio.geometry.soundness import crossings, unmatched_sides
 
 WELD_M = 1e-6  # corners closer than this are one corner: far below any part's tolerance, above STL's float32 rounding
 COPLANAR_RAD = np.deg2rad(0.2)  # neighbouring triangles within this angle are one face
@@ -223,37 +224,18 @@ def _check_closed(triangles: NDArray) -> None:
     """Every directed side must meet its opposite exactly once."""
     if len(triangles) < 4:
         raise BadInput(f"it has {len(triangles)} triangles; a solid needs at least 4.")
-    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    directed, counts = np.unique(sides, axis=0, return_counts=True)
-    known = {tuple(side) for side in directed.tolist()}
-    open_sides = sum((b, a) not in known for a, b in known)
-    if open_sides:
-        raise BadInput(f"its surface has holes: {open_sides} sides have no neighbour; close the surface.")
-    if counts.max() > 1:
-        raise BadInput(f"{int((counts > 1).sum())} sides are shared by more than two faces, or faces point both ways; make it one solid.")
+    alone, doubled = unmatched_sides(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]))
+    if len(alone):
+        raise BadInput(f"its surface has holes: {len(alone)} sides have no neighbour; close the surface.")
+    if len(doubled):
+        raise BadInput(f"{len(doubled)} sides are shared by more than two faces, or faces point both ways; make it one solid.")
 
 
 def _check_no_self_intersection(corners: NDArray, triangles: NDArray) -> None:
     """No edge may pass through the inside of a triangle that it does not touch."""
-    sides = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
-    a, b, c = (corners[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    crossings = 0
-    for start, end in sides:
-        p, q = corners[start], corners[end]
-        d_p, d_q = ((p - a) * normals).sum(axis=1), ((q - a) * normals).sum(axis=1)
-        reach = 1e-9 * np.linalg.norm(normals, axis=1)
-        maybe = (d_p * d_q < 0) & (np.abs(d_p) > reach) & (np.abs(d_q) > reach)
-        maybe &= ~np.isin(triangles, (start, end)).any(axis=1)
-        if maybe.any():
-            t = (d_p[maybe] / (d_p[maybe] - d_q[maybe]))[:, None]
-            x = p + t * (q - p)
-            n = normals[maybe]
-            u = (a[maybe], b[maybe], c[maybe])
-            inside = [np.einsum("ij,ij->i", np.cross(u[k - 2] - u[k], x - u[k]), n) > 0 for k in range(3)]
-            crossings += int(np.logical_and.reduce(inside).sum())
-    if crossings:
-        raise BadInput(f"its surface passes through itself at {crossings} places; a part must not intersect itself.")
+    places = len(crossings(corners, triangles)[0])
+    if places:
+        raise BadInput(f"its surface passes through itself at {places} places; a part must not intersect itself.")
 
 
 def _merge_coplanar(corners: NDArray, triangles: NDArray) -> list[Face]:

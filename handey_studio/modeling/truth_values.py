@@ -10,7 +10,7 @@ from handey_studio.base import Value, frozen_array
 
 @dataclass(frozen=True, eq=False)
 class Check(Value):
-    """One thing that a part must be. `name`: "closed", "planar", "crossing", "thin", "sliver", "one body", "size", "volume", "mass",
+    """One thing that a part must be. `name`: "closed", "planar", "outlines", "one body", "crossing", "thin", "sliver", "size", "volume", "mass",
     "centre of mass". `sentence` tells what was found, `fix` what would help (empty when all is well).
 
     `faces` are the numbers of the faces that it is about, `where` (n, 3) [m] points in the model frame that show it.
