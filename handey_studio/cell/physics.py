@@ -99,16 +99,20 @@ class Touching(NamedTuple):
     friction: float = 0.5
 
 
-def add_bodies(spec: Any, bodies: Sequence[SolidBody]) -> None:
-    """Bodies `body0` … in the order given, one geom `piece0_0` … a convex piece; those that are not fixed are free."""
+def add_bodies(spec: Any, bodies: Sequence[SolidBody], ghosts: bool = False) -> None:
+    """Bodies `body0` … in the order given, one geom `body0_0` … a convex piece; those that are not fixed are free.
+
+    `ghosts` are called `ghost0` … and stand wherever they are put.
+    """
+    kind = "ghost" if ghosts else "body"
     for number, body in enumerate(bodies):
         T = body.T_world_body
-        node = spec.worldbody.add_body(name=f"body{number}", pos=T[:3, 3], quat=to_wxyz(T))
-        if not body.fixed:
+        node = spec.worldbody.add_body(name=f"{kind}{number}", pos=T[:3, 3], quat=to_wxyz(T), mocap=ghosts)
+        if not (body.fixed or ghosts):
             node.add_freejoint()
-        touching = Touching(BODIES, EVERYTHING if body.fixed else BODIES | ARM, body.density, body.friction)
+        touching = Touching(BODIES, EVERYTHING if body.fixed or ghosts else BODIES | ARM, body.density, body.friction)
         for k, piece in enumerate(body.pieces):
-            add_piece(spec, node, f"piece{number}_{k}", piece, touching)
+            add_piece(spec, node, f"{kind}{number}_{k}", piece, touching)
 
 
 def add_piece(spec: Any, node: Any, name: str, piece: NDArray, touching: Touching) -> None:

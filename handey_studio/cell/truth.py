@@ -1,6 +1,7 @@
 """What every simulated cell has: a true state that the planner never sees, and a range finder that photographs it."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,12 @@ from numpy.typing import NDArray
 
 from handey_studio.base.errors import unknown_name
 from handey_studio.cell.bodies import SolidBody, check_names, fixed_bodies, solid_body
+from handey_studio.cell.faults import Fault
 from handey_studio.cell.in_view import arm_bodies
 from handey_studio.cell.physics import settle
 from handey_studio.cell.stripes import photograph
 from handey_studio.cell.workcell import SimulatedSetup, Workcell
+from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, inverse, transform
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.world.arm import arm_of
@@ -83,3 +86,9 @@ def true_bodies(workcell: Workcell, library: Library) -> tuple[SolidBody, ...]:
     bodies = (*fixed_bodies(workcell), *(solid_body(body, library.part) for body in workcell.setup.bodies))
     check_names(bodies)
     return settle(bodies).bodies if workcell.setup.drop else bodies
+
+
+def obstacles(faults: Sequence[Fault]) -> tuple[SolidBody, ...]:
+    """The bodies that faults bring in, in the faults' order."""
+    found = [fault for fault in faults if fault.kind == "obstacle"]
+    return tuple(SolidBody(f"obstacle{k + 1}", box(fault.vector), fault.T_world_body, fixed=True) for k, fault in enumerate(found))

@@ -109,7 +109,7 @@ def test_a_grip_on_nothing_reaches_what_was_asked(cell):
 
 def test_the_scan_shows_the_arm_and_what_it_holds_where_they_stand_in_its_way(cell, arms, library):
     before = GeometricCell(figure1(), library).scan().elevation
-    T_hand, up = lifted(cell, arms)
+    _, up = lifted(cell, arms)
     after = cell.scan().elevation
     assert np.nanmax(after) > cell.true_pose("l_block#2")[2, 3] > np.nanmax(before)
     cell.follow(arms.step("transfer", [up.q_rad[-1], arms.robot.home], OPEN).motion)

@@ -1,0 +1,214 @@
+"""The simulated physics of a whole cell: bodies, robot and hand in one MuJoCo model, stepped under joint control."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.cell.bodies import SolidBody
+from handey_studio.cell.physics import CONTACT_TIME_S, STEP_S, add_bodies, mujoco, new_spec, pose_of
+from handey_studio.cell.robot_model import add_robot
+from handey_studio.geometry.transforms import to_wxyz, transform
+from handey_studio.world.arm import Arm
+from handey_studio.world.robot import FINGERS
+
+ARM_RATE = 100.0  # rad/s of the joint controller's error, critically damped: what a stiff industrial arm reaches
+FINGER_RATE = 60.0  # rad/s of the fingers' drive
+FINGER_INTEGRAL = 4e5  # N/(m s): how fast the drive leans on what stops it, up to its force
+GRIP_STIFF = (0.99, 0.999, 0.0005, 0.5, 2.0)  # impedance of the pads: a held part may not creep out of them
+JAM = 1e5  # friction [N m, N] of what is jammed
+NOWHERE = np.array([0.0, 0.0, -50.0])  # where bodies wait that are not there yet
+
+
+class Reference(NamedTuple):
+    """What the arm is to do in one step: `q`, its velocity and acceleration (joints,)."""
+
+    q: NDArray
+    velocity: NDArray
+    acceleration: NDArray
+
+
+class Drive(NamedTuple):
+    """What the fingers are to do in one step: the `opening` [m] they follow, its `speed` [m/s], the `force` [N] each may use."""
+
+    opening: float
+    speed: float
+    force: float
+
+
+class Simulation:
+    """Arm, hand and bodies in one model. Not a value: it is stepped. `ghosts` are bodies that wait outside until `appear` is called."""
+
+    dt = STEP_S
+
+    def __init__(self, arm: Arm, bodies: Sequence[SolidBody], ghosts: Sequence[SolidBody] = ()) -> None:
+        self.bodies, self._ghosts, self._arm = tuple(bodies), tuple(ghosts), arm
+        self.model = _compiled(arm, self.bodies, self._ghosts)
+        self.data = mujoco.MjData(self.model)
+        joints = [self.model.joint(f"joint{i + 1}") for i in range(arm.n)]
+        self._q_at = np.array([joint.qposadr[0] for joint in joints])
+        self.arm_dofs = np.array([joint.dofadr[0] for joint in joints])
+        self._finger_at = np.array([self.model.joint(name).qposadr[0] for name in FINGERS])
+        self.finger_dofs = np.array([self.model.joint(name).dofadr[0] for name in FINGERS])
+        self._site = self.model.site("hand").id
+        self._hand_bodies = np.array([self.model.body(name).id for name in ("hand", *FINGERS)])
+        self._base = self.model.body("link0").id
+        limits = np.array(arm.model.effortLimit, dtype=float)
+        self._effort = np.where((limits > 0) & np.isfinite(limits), limits, np.inf)
+        self._finger_gain = FINGER_RATE**2 * float(self.model.dof_armature[self.finger_dofs[0]])
+        self._finger_damping = 2.0 * self._finger_gain / FINGER_RATE
+        self._integral = 0.0
+        self.finger_force = 0.0
+        """What each finger's drive closes with now [N]."""
+        self._wanted, self._torque = np.zeros(self.model.nv), np.zeros(self.model.nv)
+        for number in range(len(self._ghosts)):
+            self.appear(number, False)
+        self._free = {body.name: self.model.body(f"body{k}") for k, body in enumerate(self.bodies) if not body.fixed}
+
+    def place(self, q: NDArray, opening: float, grip_N: float = 0.0) -> None:
+        """Put arm and fingers somewhere at rest, the fingers closing with a force."""
+        self.data.qpos[self._q_at], self.data.qpos[self._finger_at] = q, opening / 2
+        self.data.qvel[:] = 0.0
+        self._integral = -grip_N
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self, to: Reference, fingers: Drive) -> None:
+        """One time step: torques that bring the error of each joint down at the controller's rate, on the arm's own inertia."""
+        model, data = self.model, self.data
+        mujoco.mj_step1(model, data)
+        dofs = self.arm_dofs
+        error, behind = to.q - data.qpos[self._q_at], to.velocity - data.qvel[dofs]
+        self._wanted[dofs] = to.acceleration + ARM_RATE**2 * error + 2.0 * ARM_RATE * behind
+        mujoco.mj_mulM(model, data, self._torque, self._wanted)
+        torque = self._torque[dofs] + data.qfrc_bias[dofs]
+        data.qfrc_applied[dofs] = np.clip(torque, -self._effort, self._effort)
+        data.qfrc_applied[self.finger_dofs] = self._finger_push(fingers) + data.qfrc_bias[self.finger_dofs]
+        mujoco.mj_step2(model, data)
+
+    def _finger_push(self, to: Drive) -> float:
+        """The drive's force outwards on each finger: as a spring that leans on what stops it, up to its force."""
+        data = self.data
+        error = to.opening / 2 - float(data.qpos[self._finger_at].mean())
+        behind = to.speed / 2 - float(data.qvel[self.finger_dofs].mean())
+        self._integral = float(np.clip(self._integral + FINGER_INTEGRAL * error * self.dt, -to.force, to.force))
+        push = float(np.clip(self._finger_gain * error + self._finger_damping * behind + self._integral, -to.force, to.force))
+        self.finger_force = -push
+        return push
+
+    @property
+    def q(self) -> NDArray:
+        return self.data.qpos[self._q_at]
+
+    @property
+    def velocity(self) -> NDArray:
+        return self.data.qvel[self.arm_dofs]
+
+    @property
+    def opening(self) -> float:
+        return 2.0 * float(self.data.qpos[self._finger_at].mean())
+
+    @property
+    def finger_speed(self) -> float:
+        """How fast the opening changes [m/s]."""
+        return 2.0 * float(self.data.qvel[self.finger_dofs].mean())
+
+    @property
+    def hand_pose(self) -> NDArray:
+        """T_world_hand (4, 4)."""
+        return transform(self.data.site_xmat[self._site].reshape(3, 3), self.data.site_xpos[self._site])
+
+    def jacobian(self) -> NDArray:
+        """(6, joints): velocity and turn of the hand's origin in the world for each joint's."""
+        turn, move = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jacSite(self.model, self.data, move, turn, self._site)
+        return np.concatenate([move, turn])[:, self.arm_dofs]
+
+    def wrench(self) -> tuple[NDArray, NDArray]:
+        """Force (3,) and torque (3,) about the hand's origin that all contacts put on crosspiece and fingers together."""
+        mujoco.mj_rnePostConstraint(self.model, self.data)
+        total = self.data.cfrc_ext[self._hand_bodies].sum(axis=0)
+        force = total[3:]
+        lever = self.data.subtree_com[self._base] - self.data.site_xpos[self._site]
+        return force.copy(), total[:3] + np.cross(lever, force)
+
+    def body_poses(self) -> dict[str, NDArray]:
+        """T_world_body (4, 4) of the free bodies by name."""
+        poses = {}
+        for name, body in self._free.items():
+            start = self.model.jnt_qposadr[body.jntadr[0]]
+            poses[name] = pose_of(self.data.qpos[start : start + 7])
+        return poses
+
+    def true_bodies(self) -> tuple[SolidBody, ...]:
+        """All bodies where they are now."""
+        poses = self.body_poses()
+        return tuple(body if body.fixed else body.at(poses[body.name]) for body in self.bodies)
+
+    def calm(self, speed: float, turn: float) -> bool:
+        """Whether every free body is slower than `speed` [m/s] and `turn` [rad/s]."""
+        rates = np.array([self.data.qvel[body.dofadr[0] : body.dofadr[0] + 6] for body in self._free.values()]).reshape(-1, 6)
+        return bool((np.abs(rates[:, :3]) < speed).all() and (np.abs(rates[:, 3:]) < turn).all())
+
+    def held(self) -> str | None:
+        """Name of the free body that both fingers press on, the one pressed most if several."""
+        pressed: dict[str, dict[int, float]] = {}
+        owner = {body.id: name for name, body in self._free.items()}
+        force = np.zeros(6)
+        for k, contact in enumerate(self.data.contact):
+            pair = self.model.geom_bodyid[contact.geom]
+            for finger, other in (pair, pair[::-1]):
+                if finger in self._hand_bodies[1:] and other in owner:
+                    mujoco.mj_contactForce(self.model, self.data, k, force)
+                    by_finger = pressed.setdefault(owner[other], {})
+                    by_finger[finger] = by_finger.get(finger, 0.0) + float(force[0])
+        both = {name: min(forces.values()) for name, forces in pressed.items() if len(forces) == 2 and min(forces.values()) > 0}
+        return max(both, key=both.__getitem__, default=None)
+
+    def rub(self, name: str, share: float) -> None:
+        """The friction between the fingers and a body becomes a share of its own."""
+        number = next(k for k, body in enumerate(self.bodies) if body.name == name)
+        own = _pad_friction(self._arm, self.bodies[number])
+        for k in range(self.model.npair):
+            if self.model.geom_bodyid[self.model.pair_geom2[k]] == self.model.body(f"body{number}").id:
+                self.model.pair_friction[k] = np.array(own) * share
+
+    def push(self, name: str, force: NDArray) -> None:
+        """A force (3,) [N] acts on a free body's centre until it is set anew."""
+        self.data.xfrc_applied[self._free[name].id, :3] = force
+
+    def jam(self, dofs: NDArray, jammed: bool) -> None:
+        """Jam joints, or free them."""
+        self.model.dof_frictionloss[dofs] = JAM if jammed else 0.0
+
+    def appear(self, number: int, there: bool) -> None:
+        """A ghost comes to its place, or goes."""
+        mocap, ghost = self.model.body(f"ghost{number}").mocapid[0], self._ghosts[number]
+        self.data.mocap_pos[mocap] = ghost.T_world_body[:3, 3] if there else NOWHERE
+        self.data.mocap_quat[mocap] = to_wxyz(ghost.T_world_body)
+
+
+def _compiled(arm: Arm, bodies: Sequence[SolidBody], ghosts: Sequence[SolidBody]) -> Any:
+    spec = new_spec()
+    add_bodies(spec, bodies)
+    add_bodies(spec, ghosts, ghosts=True)
+    add_robot(spec, arm)
+    for number, body in enumerate(bodies):
+        if not body.fixed:
+            for finger in FINGERS:
+                for k in range(len(body.pieces)):
+                    _add_grip(spec, finger, f"body{number}_{k}", _pad_friction(arm, body))
+    return spec.compile()
+
+
+def _add_grip(spec: Any, finger: str, piece: str, friction: list[float]) -> None:
+    """How a finger's pad touches a piece."""
+    spec.add_pair(
+        geomname1=finger, geomname2=piece, condim=4, friction=friction, solref=[CONTACT_TIME_S, 1.0], solimp=GRIP_STIFF
+    )  # fmt: skip
+
+
+def _pad_friction(arm: Arm, body: SolidBody) -> list[float]:
+    """Sliding twice, turning [m], rolling twice [m]: pads press with a face, so they resist turning by their size as well."""
+    sliding = arm.robot.hand.pad_friction * body.friction
+    return [sliding, sliding, 0.005, 0.0001, 0.0001]
