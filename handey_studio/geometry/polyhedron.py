@@ -158,10 +158,16 @@ def polyhedron_from_polygons(vertices: ArrayLike, polygons: list[list[int]]) -> 
     if np.einsum("ij,ij->i", corners[triangles[:, 0]], np.cross(corners[triangles[:, 1]], corners[triangles[:, 2]])).sum() < 0:
         triangles = triangles[:, ::-1]
     _check_no_self_intersection(corners, triangles)
-    faces = _merge_coplanar(corners, triangles)
-    solid = _compact(corners, _drop_straight_corners(corners, faces))
-    if solid.volume_and_centroid[0] < 1e-12:
-        raise BadInput(f"its volume is {solid.volume_and_centroid[0] * 1e9:.3g} mm³; a part must be a solid.")
+    faces = _drop_straight_corners(corners, _merge_coplanar(corners, triangles))
+    if any(len(loop) < 3 for face in faces for loop in face.loops):
+        raise BadInput("a face has shrunk to a line; remove slivers from the surface.")
+    solid = _compact(corners, faces)
+    try:
+        volume = solid.volume_and_centroid[0]
+    except shapely.errors.GEOSException:
+        raise BadInput("a face is folded, or too narrow to be cut into triangles; remove slivers from the surface.") from None
+    if volume < 1e-12:
+        raise BadInput(f"its volume is {volume * 1e9:.3g} mm³; a part must be a solid.")
     return solid
 
 

@@ -30,8 +30,9 @@ from handey_studio.modeling.operations import (
     Sketch,
     TakeSuggestion,
 )
-from handey_studio.modeling.planes import inherited, sound
+from handey_studio.modeling.planes import inherited
 from handey_studio.modeling.solids import combined, cut_by_plane, mirrored
+from handey_studio.modeling.soundness import sound
 from handey_studio.modeling.state import Maker, State
 
 SET_BY_HAND = "set by hand"

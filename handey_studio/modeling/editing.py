@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from handey_studio.base import BadInput, Value, measured
 from handey_studio.geometry import Edge, Polyhedron
 from handey_studio.geometry.transforms import rotation_about
-from handey_studio.modeling.planes import corners_on_planes, faces_at_corners, inherited, shrunk, sound, told_point
+from handey_studio.modeling.planes import corners_on_planes, faces_at_corners, inherited, told_point
+from handey_studio.modeling.soundness import shrunk, sound, with_same_faces, without_slivers
 
 PARALLEL_RAD = float(np.deg2rad(0.2))  # what the polyhedron itself takes for one plane
 LEAST_WAY_M = 1e-6
@@ -147,7 +148,10 @@ def _still(change: Callable[..., object], *given: object) -> bool:
 def _rebuilt(solid: Polyhedron, normals: NDArray, offsets: NDArray) -> Change:
     """The solid in other planes with the same neighbours. Raises BadInput."""
     corners = _corners(solid, normals, offsets)
-    changed = sound(corners, solid.faces)
+    kept = with_same_faces(solid, corners)
+    if kept is not None:
+        return Change(without_slivers(kept, "it", solid), tuple(range(len(kept.faces))))
+    changed = without_slivers(sound(corners, solid.faces), "it", solid)
     left = [f for f, face in enumerate(solid.faces) if not shrunk(corners[list(face.outer)])]
     drawn = Polyhedron(corners, tuple(solid.faces[f] for f in left))
     return Change(changed, inherited(changed, [(drawn, left)], left[0]))

@@ -45,6 +45,8 @@ class TakeSuggestion(Operation):
 
     def __post_init__(self) -> None:
         keep(self, "vertices", numbers(self.vertices, (-1, 3), "the corners of a suggestion"))
+        if len(self.vertices) < 4 or len(self.faces) < 4:
+            raise BadInput(f"a suggestion has {len(self.vertices)} corners and {len(self.faces)} faces; a solid has at least 4 of each.")
         if len(self.vertices) > MAX_SUGGESTED_CORNERS or len(self.faces) > MAX_SUGGESTED_CORNERS:
             raise BadInput(
                 f"a suggestion has {len(self.vertices)} corners and {len(self.faces)} faces, the limit is {MAX_SUGGESTED_CORNERS}."

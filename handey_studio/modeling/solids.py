@@ -13,10 +13,11 @@ from scipy.sparse.csgraph import connected_components
 
 from handey_studio.base import BadInput, measured
 from handey_studio.geometry import Face, Polyhedron, polyhedron_from_polygons
-from handey_studio.modeling.planes import corners_on_planes, flat, nearest_plane, onto_planes, sound, told_point
+from handey_studio.modeling.planes import corners_on_planes, nearest_plane, onto_planes
+from handey_studio.modeling.soundness import SLIVER_M, checked, narrowest, sound, without_slivers
 
 FLUSH_M = 2e-5  # a face of a tool this near to a plane of the solid is meant to be in it; what lay between would be a sliver
-SLIVER_M = 1e-4  # narrower than a tenth of a millimetre is a slip of the hand, and no sensor sees it
+DEEPER_M = 5e-7  # a cut along a face goes this much deeper, so that rounding leaves no film; its face is then put where it belongs
 SAME_VOLUME_M3 = 1e-13
 FAR_M = 3.0
 WORDS = {"join": "joining them", "cut": "the cut", "common": "keeping what is common"}
@@ -33,8 +34,7 @@ def combined(solid: Polyhedron, tool: Polyhedron, how: Literal["join", "cut", "c
     _check_effect(a, b, result, how)
     normals = np.concatenate([solid.normals, tool.normals])
     offsets = np.concatenate([solid.offsets, tool.offsets])
-    least = min(SLIVER_M, narrowest(solid)[0], narrowest(tool)[0])
-    return _polyhedron(result, normals, offsets, least, WORDS[how])
+    return without_slivers(_polyhedron(result, normals, offsets, WORDS[how]), WORDS[how], solid, tool)
 
 
 def cut_by_plane(solid: Polyhedron, point: ArrayLike, normal: ArrayLike) -> Polyhedron:
@@ -46,9 +46,9 @@ def cut_by_plane(solid: Polyhedron, point: ArrayLike, normal: ArrayLike) -> Poly
         raise BadInput("the plane does not pass through the solid on the side that it would cut off; nothing would change.")
     if heights.min() > -SLIVER_M:
         raise BadInput("the plane would cut off the whole solid; turn it round or move it.")
-    result = _manifold(solid).trim_by_plane(tuple(-normal), -offset)
+    result = _manifold(solid).trim_by_plane(tuple(-normal), DEEPER_M - offset)
     normals, offsets = np.vstack([solid.normals, normal]), np.append(solid.offsets, offset)
-    return _polyhedron(result, normals, offsets, min(SLIVER_M, narrowest(solid)[0]), WORDS["cut"])
+    return without_slivers(_polyhedron(result, normals, offsets, WORDS["cut"]), WORDS["cut"], solid)
 
 
 def mirrored(solid: Polyhedron, point: ArrayLike, normal: ArrayLike) -> Polyhedron:
@@ -78,20 +78,6 @@ def prism_between(rings: list[NDArray], normal: NDArray, far_normal: NDArray, fa
     up = float(np.sign(all_heights[0]))
     tops = [ring + height[:, None] * normal for ring, height in zip(rings, heights, strict=True)]
     return _prism(rings, tops, up * normal)
-
-
-def narrowest(solid: Polyhedron) -> tuple[float, NDArray]:
-    """The width [m] of a solid's narrowest face or the length of its shortest edge, whichever is less, and where (3,) [m]."""
-    best, where = np.inf, solid.vertices[0]
-    for face, normal in zip(solid.faces, solid.normals, strict=True):
-        rings = [solid.vertices[list(loop)] for loop in face.loops]
-        area = sum(float(normal @ np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)) for ring in rings)
-        for corners in rings:
-            sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-            width = min(float(sides.min()), area / float(sides.max()))
-            if width < best:
-                best, where = width, corners[int(np.argmin(sides))]
-    return best, where
 
 
 def _prism(bottoms: list[NDArray], tops: list[NDArray], up: NDArray) -> Polyhedron:
@@ -126,9 +112,10 @@ def _made_flush(tool: Polyhedron, solid: Polyhedron) -> Polyhedron:
         if off < FLUSH_M:
             normals[f], offsets[f] = sign * solid.normals[k], sign * solid.offsets[k]
     try:
-        return Polyhedron(corners_on_planes(tool, normals, offsets), tool.faces)
+        flush = Polyhedron(corners_on_planes(tool, normals, offsets), tool.faces)
     except BadInput:  # more than three faces meet at a corner: it stays as it was drawn
         return tool
+    return flush if narrowest(tool)[0] > 4.0 * FLUSH_M else tool
 
 
 def _check_effect(a: manifold3d.Manifold, b: manifold3d.Manifold, result: manifold3d.Manifold, how: str) -> None:
@@ -145,18 +132,12 @@ def _check_effect(a: manifold3d.Manifold, b: manifold3d.Manifold, result: manifo
         raise BadInput(f"{told.get(how, 'the solid lies wholly inside the other body')}; nothing would change.")
 
 
-def _polyhedron(result: manifold3d.Manifold, normals: NDArray, offsets: NDArray, least: float, what: str) -> Polyhedron:
+def _polyhedron(result: manifold3d.Manifold, normals: NDArray, offsets: NDArray, what: str) -> Polyhedron:
     """The solid of a boolean's mesh, its faces in the planes that they came from. Raises BadInput when it is not one sound body."""
     mesh = result.to_mesh64()
     vertices, triangles = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
     triangles = _one_body(vertices, triangles, what)
-    solid = flat(onto_planes(polyhedron_from_polygons(vertices, triangles.tolist()), normals, offsets))
-    width, where = narrowest(solid)
-    if width < least * (1.0 - 1e-6):
-        raise BadInput(
-            f"{what} would leave a sliver {measured(width, 'm')} wide at {told_point(where)}; move it to meet the solid or clear it."
-        )
-    return solid
+    return checked(onto_planes(polyhedron_from_polygons(vertices, triangles.tolist()), normals, offsets))
 
 
 def _one_body(vertices: NDArray, triangles: NDArray, what: str) -> NDArray:
