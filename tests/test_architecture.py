@@ -65,7 +65,7 @@ def test_only_the_workbench_imports_viser():
 
 def test_no_planner_imports_the_simulated_truth():
     hidden = {"handey_studio.cell.simulated", "handey_studio.cell.truth", "handey_studio.cell.geometric", "handey_studio.cell.piles"}
-    hidden |= {"handey_studio.cell.physical", "handey_studio.cell.simulation", "handey_studio.cell.in_view"}
+    hidden |= {"handey_studio.cell.physical", "handey_studio.cell.simulation", "handey_studio.cell.simulated_driver"}
     hidden |= {"handey_studio.cell.bodies", "handey_studio.cell.stripes"}
     hidden |= {"handey_studio.cell.camera", "handey_studio.cell.solvable", "handey_studio.cell.scenes", "handey_studio.cell.scene_files"}
     planners = {"localization", "motion", "grasping", "sensing", "world"}

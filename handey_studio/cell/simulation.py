@@ -1,15 +1,16 @@
 """The simulated physics of a whole cell: bodies, robot and hand in one MuJoCo model, stepped under joint control."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.cell.bodies import SolidBody
+from handey_studio.cell.driver import Drive, Reference
 from handey_studio.cell.physics import CONTACT_TIME_S, STEP_S, add_bodies, mujoco, new_spec, pose_of
 from handey_studio.cell.robot_model import add_robot
-from handey_studio.geometry.transforms import to_wxyz, transform
+from handey_studio.geometry.transforms import to_wxyz
 from handey_studio.world.arm import Arm
 from handey_studio.world.robot import FINGERS
 
@@ -19,22 +20,6 @@ FINGER_INTEGRAL = 4e5  # N/(m s): how fast the drive leans on what stops it, up 
 GRIP_STIFF = (0.99, 0.999, 0.0005, 0.5, 2.0)  # impedance of the pads: a held part may not creep out of them
 JAM = 1e5  # friction [N m, N] of what is jammed
 NOWHERE = np.array([0.0, 0.0, -50.0])  # where bodies wait that are not there yet
-
-
-class Reference(NamedTuple):
-    """What the arm is to do in one step: `q`, its velocity and acceleration (joints,)."""
-
-    q: NDArray
-    velocity: NDArray
-    acceleration: NDArray
-
-
-class Drive(NamedTuple):
-    """What the fingers are to do in one step: the `opening` [m] they follow, its `speed` [m/s], the `force` [N] each may use."""
-
-    opening: float
-    speed: float
-    force: float
 
 
 class Simulation:
@@ -62,6 +47,7 @@ class Simulation:
         self.finger_force = 0.0
         """What each finger's drive closes with now [N]."""
         self._wanted, self._torque = np.zeros(self.model.nv), np.zeros(self.model.nv)
+        self._there: set[int] = set()
         for number in range(len(self._ghosts)):
             self.appear(number, False)
         self._free = {body.name: self.model.body(f"body{k}") for k, body in enumerate(self.bodies) if not body.fixed}
@@ -74,11 +60,15 @@ class Simulation:
         mujoco.mj_forward(self.model, self.data)
 
     def step(self, to: Reference, fingers: Drive) -> None:
-        """One time step: torques that bring the error of each joint down at the controller's rate, on the arm's own inertia."""
+        """One time step: torques that bring the error of each joint down at the controller's rate, on the arm's own inertia.
+
+        `to` is where the joints are to be at its end, so at its start they were to be a step's way before that.
+        """
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
         dofs = self.arm_dofs
-        error, behind = to.q - data.qpos[self._q_at], to.velocity - data.qvel[dofs]
+        error = to.q - to.velocity * self.dt - data.qpos[self._q_at]
+        behind = to.velocity - to.acceleration * self.dt - data.qvel[dofs]
         self._wanted[dofs] = to.acceleration + ARM_RATE**2 * error + 2.0 * ARM_RATE * behind
         mujoco.mj_mulM(model, data, self._torque, self._wanted)
         torque = self._torque[dofs] + data.qfrc_bias[dofs]
@@ -108,22 +98,6 @@ class Simulation:
     def opening(self) -> float:
         return 2.0 * float(self.data.qpos[self._finger_at].mean())
 
-    @property
-    def finger_speed(self) -> float:
-        """How fast the opening changes [m/s]."""
-        return 2.0 * float(self.data.qvel[self.finger_dofs].mean())
-
-    @property
-    def hand_pose(self) -> NDArray:
-        """T_world_hand (4, 4)."""
-        return transform(self.data.site_xmat[self._site].reshape(3, 3), self.data.site_xpos[self._site])
-
-    def jacobian(self) -> NDArray:
-        """(6, joints): velocity and turn of the hand's origin in the world for each joint's."""
-        turn, move = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
-        mujoco.mj_jacSite(self.model, self.data, move, turn, self._site)
-        return np.concatenate([move, turn])[:, self.arm_dofs]
-
     def wrench(self) -> tuple[NDArray, NDArray]:
         """Force (3,) and torque (3,) about the hand's origin that all contacts put on crosspiece and fingers together."""
         mujoco.mj_rnePostConstraint(self.model, self.data)
@@ -141,9 +115,9 @@ class Simulation:
         return poses
 
     def true_bodies(self) -> tuple[SolidBody, ...]:
-        """All bodies where they are now."""
-        poses = self.body_poses()
-        return tuple(body if body.fixed else body.at(poses[body.name]) for body in self.bodies)
+        """All bodies where they are now, the ghosts that have come among them."""
+        poses, ghosts = self.body_poses(), tuple(self._ghosts[number] for number in sorted(self._there))
+        return tuple(body if body.fixed else body.at(poses[body.name]) for body in self.bodies) + ghosts
 
     def calm(self, speed: float, turn: float) -> bool:
         """Whether every free body is slower than `speed` [m/s] and `turn` [rad/s]."""
@@ -183,6 +157,7 @@ class Simulation:
 
     def appear(self, number: int, there: bool) -> None:
         """A ghost comes to its place, or goes."""
+        self._there = self._there | {number} if there else self._there - {number}
         mocap, ghost = self.model.body(f"ghost{number}").mocapid[0], self._ghosts[number]
         self.data.mocap_pos[mocap] = ghost.T_world_body[:3, 3] if there else NOWHERE
         self.data.mocap_quat[mocap] = to_wxyz(ghost.T_world_body)
