@@ -18,6 +18,7 @@ from handey_studio.app.browsing import (
     page_of,
     wired,
 )
+from handey_studio.app.modelling.clicks import click_taken_back
 from handey_studio.app.state import State, redone, undone, with_robot, with_view
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import is_rigid
@@ -102,8 +103,11 @@ class SetSeed:
 
 @dataclass(frozen=True)
 class Undo:
+    """The last change is taken back; while a tool of the modeller waits for its next click, that tool's last click."""
+
     def apply(self, state: State) -> State:
-        return undone(state)
+        before = click_taken_back(state)
+        return undone(state) if before is None else before
 
 
 @dataclass(frozen=True)
@@ -214,7 +218,7 @@ class PointAt:
 
     def apply(self, state: State) -> State:
         session = state.session
-        if session.scene is None:
+        if session.scene is None or state.model.open:
             return state
         there = hypotheses_at(session.scene, session.parts, wired(state), self.origin, self.direction)
         if there:

@@ -8,7 +8,9 @@ STAGES = (("Sense", 0.0), ("Plan", SENSED), ("Execute", PLANNED))
 
 
 def stages(job: Job) -> list[tuple[str, str]]:
-    """Each stage of a job and whether it is done, now or later."""
+    """Each stage of a MOVE and whether it is done, now or later; other jobs have none."""
+    if job.done is not None:
+        return []
     named = STAGES if job.execute else STAGES[:2]
     ends = [start for _, start in named[1:]] + [1.01]
     return [
@@ -21,7 +23,7 @@ def next_step(state: State) -> tuple[str, str, str]:
     """(title, sentence, tone)."""
     session, job = state.session, state.job
     if job is not None:
-        what = "Stopping" if job.cancelling else "Moving" if job.execute else "Planning"
+        what = "Stopping" if job.cancelling else job.title or ("Moving" if job.execute else "Planning")
         return f"{what} …", job.message, "info"
     if not session.workcell.parts:
         return "This workcell has no part models", "Open a session that has some: Session → Open.", "quiet"

@@ -1,5 +1,6 @@
 """What the planner says, as commands: it started, got on, has something to show, is done, or failed."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from handey_studio.app.state import Job, State, with_view
@@ -45,6 +46,8 @@ class JobDone:
     def apply(self, state: State) -> State:
         if state.job is None or state.job.number != self.number:
             return state
+        if state.job.done is not None:
+            return state.job.done(replace(state, job=None), self.session)
         session = merged(state.session, self.session)
         state = replace(state, session=session, job=None, ledger_at=ROOT, ledger_page=0, ledger_entry=ROOT)
         state = with_view(state, time_s=0.0, result=-1)
@@ -70,10 +73,15 @@ class JobFailed:
 
 @dataclass(frozen=True)
 class JobStarted:
+    """`title` and `done` as in `Job`."""
+
     execute: bool
+    title: str = ""
+    done: Callable[[State, Session], State] | None = None
 
     def apply(self, state: State) -> State:
-        return replace(state, jobs=state.jobs + 1, playing=False, job=Job(state.jobs + 1, self.execute))
+        job = Job(state.jobs + 1, self.execute, title=self.title, done=self.done)
+        return replace(state, jobs=state.jobs + 1, playing=False, job=job)
 
 
 def merged(shown: Session, found: Session) -> Session:

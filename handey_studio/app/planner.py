@@ -8,7 +8,7 @@ import logging
 import multiprocessing as mp
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -58,6 +58,7 @@ class _Order:
     session: Session
     library: Library
     execute: bool
+    run: Run | None
 
 
 class PipeProgress:
@@ -101,15 +102,15 @@ class Planner:
         theirs.close()
         threading.Thread(target=self._listen, args=(self._pipe, self._process), name="planner-listener", daemon=True).start()
 
-    def order(self, number: int, session: Session, library: Library, execute: bool) -> None:
-        """Start a job; whatever it has to say is heard later."""
+    def order(self, number: int, session: Session, library: Library, execute: bool, run: Run | None = None) -> None:
+        """Start a job, with another function than the planner's own if one is given; whatever it has to say is heard later."""
         with self._lock:
             if not self._process.is_alive():
                 self._start()
             self._number = number
             self._cancel.clear()
             try:
-                self._pipe.send(_Order(number, session, library, execute))
+                self._pipe.send(_Order(number, replace(session, draft=None), library, execute, run))
             except (BrokenPipeError, OSError):
                 self._heard(Failed(number, "The planner could not be reached; press again to start a new one.", True))
 
@@ -153,7 +154,7 @@ def _serve(pipe: Connection, cancel: Any, run: Run, prepare: Callable[[], None] 
             return
         progress = PipeProgress(order.number, pipe, cancel)
         try:
-            pipe.send(Finished(order.number, run(order.session, order.library, order.execute, progress)))
+            pipe.send(Finished(order.number, (order.run or run)(order.session, order.library, order.execute, progress)))
         except BadInput as error:
             pipe.send(Failed(order.number, str(error)))
         except KeyboardInterrupt:

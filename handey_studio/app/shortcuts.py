@@ -4,8 +4,10 @@ from typing import Any
 
 import viser
 
-from handey_studio.app.actions import CancelMove, Follow, LookFrom, SaveSession, StartMove
+from handey_studio.app.actions import Follow, LookFrom, SaveSession, StartMove
 from handey_studio.app.commands import Browse, LookAt, Redo, Undo
+from handey_studio.app.modelling.accepting import Accept, Escape
+from handey_studio.app.modelling.steps import RemovePicked
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.playback import SeekStep, TogglePlay
 from handey_studio.app.wire import Send, on_trigger
@@ -22,7 +24,9 @@ KEYS: tuple[tuple[str, Any, Any, Any], ...] = (
     ("Plan", "P", None, StartMove(execute=False)),
     ("MOVE", "M", None, StartMove(execute=True)),
     ("Look at no hypothesis", "0", None, LookAt(-1)),
-    ("Cancel planning", "escape", None, CancelMove()),
+    ("Cancel planning, or put the modeller's tool down", "escape", None, Escape()),
+    ("Take what the modeller offers, or finish its tool", "enter", None, Accept()),
+    ("Delete the step that is looked at, or the solid", "delete", None, RemovePicked()),
 )
 BROWSE_KEYS: tuple[tuple[str, Any, int], ...] = (("Next hypothesis", "N", 1), ("Hypothesis before", "B", -1))
 VIEW_KEYS: tuple[tuple[Any, str], ...] = (

@@ -1,13 +1,16 @@
 """The workbench's state: one frozen value. The next state is a new value; nothing here knows of a browser."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
 from handey_studio.app.grasp_look import GraspLook
+from handey_studio.app.modelling.look import ModelLook
 from handey_studio.base import Entry
 from handey_studio.localization import Hypothesis
 from handey_studio.localization.explain import Explanation
+from handey_studio.modeling.draft import Draft
 from handey_studio.session import Replay, Session
 from handey_studio.session.handling import Handling
 from handey_studio.session.ledger_tree import ROOT
@@ -20,18 +23,19 @@ MAX_UNDO = 100
 
 @dataclass(frozen=True)
 class Settings:
-    """What the user sets and can take back: the MOVE commands, the seed and the robot."""
+    """What the user sets and can take back: the MOVE commands, the seed, the robot and the part that is being modelled."""
 
     commands: tuple[MoveCommand, ...]
     seed: int
     robot: str
+    draft: Draft | None = None
 
     @classmethod
     def of(cls, session: Session) -> "Settings":
-        return cls(session.commands, session.seed, session.workcell.robot)
+        return cls(session.commands, session.seed, session.workcell.robot, session.draft)
 
     def put_into(self, session: Session) -> Session:
-        return with_robot(replace(session, commands=self.commands, seed=self.seed), self.robot)
+        return with_robot(replace(session, commands=self.commands, seed=self.seed, draft=self.draft), self.robot)
 
 
 def with_robot(session: Session, robot: str) -> Session:
@@ -52,13 +56,16 @@ class Change:
 
 @dataclass(frozen=True)
 class Job:
-    """What the planner is doing. `execute`: whether the cell carries the plan out."""
+    """What the planner is doing. `execute`: whether the cell carries the plan out. A job that is no MOVE has a `title` and says with
+    `done` what becomes of the session that comes back."""
 
     number: int
     execute: bool
     fraction: float = 0.0
     message: str = "Starting the planner; the first time on a machine it compiles for half a minute."
     cancelling: bool = False
+    title: str = ""
+    done: "Callable[[State, Session], State] | None" = None
 
 
 @dataclass(frozen=True)
@@ -122,6 +129,7 @@ class State:
     explained: Explained | None = None
     handled: Handled | None = None
     grasp_look: GraspLook = field(default_factory=GraspLook)
+    model: ModelLook = field(default_factory=ModelLook)
     loads: int = field(default=0)
 
     @property
@@ -248,4 +256,5 @@ def _replay(robot: Robot, plan) -> Replay:
 
 def _kept(session: Session) -> tuple:
     """What makes a session worth saving. Arrays are compared by identity: they never change."""
-    return session.name, id(session.workcell), session.commands, session.seed, id(session.scene), tuple(map(id, session.results))
+    found = id(session.scene), tuple(map(id, session.results))
+    return session.name, id(session.workcell), session.commands, session.seed, id(session.draft), found

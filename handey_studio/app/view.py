@@ -5,11 +5,13 @@ from typing import Any, Protocol
 import viser
 
 from handey_studio.app import palette
+from handey_studio.app.modelling.aside import aside
 from handey_studio.app.panels.edges import EdgesPanel
 from handey_studio.app.panels.findings import PathPanel, ResultPanel
 from handey_studio.app.panels.grasp import GraspPanel
 from handey_studio.app.panels.ledger import LedgerPanel
 from handey_studio.app.panels.looking import LookingPanel
+from handey_studio.app.panels.model import ModelPanel
 from handey_studio.app.panels.move import MovePanel
 from handey_studio.app.panels.sensing import SensingPanel
 from handey_studio.app.panels.session import SessionPanel
@@ -21,6 +23,9 @@ from handey_studio.app.scene.failure import FailureScene
 from handey_studio.app.scene.findings import PlanScene
 from handey_studio.app.scene.grasp import GraspScene, StandingScene
 from handey_studio.app.scene.hypothesis import HypothesisScene
+from handey_studio.app.scene.modelling.clicks import ClickScenes
+from handey_studio.app.scene.modelling.scans import ScanScene
+from handey_studio.app.scene.modelling.solid import SolidScene
 from handey_studio.app.scene.pair import PairScene
 from handey_studio.app.scene.parts import PartsScene
 from handey_studio.app.scene.pile import PileScene
@@ -52,19 +57,25 @@ class View:
         scenes += [PairScene(server), PlanScene(server), GraspScene(server), StandingScene(server)]
         scenes += [CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
         session = SessionPanel(server, send)
-        self._panes: list[Pane] = [*scenes, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
+        self._of_move: list[Pane] = scenes
+        models: list[Pane] = [ScanScene(server), SolidScene(server), ClickScenes(server, send)]
+        self._panes: list[Pane] = [*models, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(RIGHT_WIDTH)
         add_shortcuts(server.gui, send, session)
 
     def render(self, old: State | None, new: State) -> None:
         with self._server.atomic():
+            for pane in self._of_move:
+                pane.render(None if old is None else aside(old), aside(new))
             for pane in self._panes:
                 pane.render(old, new)
 
 
 def _left(gui: viser.GuiApi, send: Send) -> list[Any]:
     panel = gui.add_panel()
+    with panel.add_tab("Model", viser.Icon.CUBE):
+        model = ModelPanel(gui, send)
     with panel.add_tab("Move", viser.Icon.ROBOT):
         move = MovePanel(gui, send)
     with panel.add_tab("View", viser.Icon.EYE):
@@ -73,7 +84,7 @@ def _left(gui: viser.GuiApi, send: Send) -> list[Any]:
         edges = EdgesPanel(gui, send)
     panel.dock_left()
     panel.set_width(LEFT_WIDTH)
-    return [move, looking, edges]
+    return [model, move, looking, edges]
 
 
 def _right(gui: viser.GuiApi, send: Send) -> list[Any]:

@@ -1,5 +1,6 @@
 """Widgets to commands and back, with the few hooks into viser that are not public kept in one place."""
 
+import json
 import logging
 from collections.abc import Callable
 from typing import Any
@@ -35,14 +36,14 @@ def on_click(handle: Any, send: Send, make: Callable[[Any], Any]) -> None:
     handle.on_click(pressed)
 
 
-def on_scene_click(server: viser.ViserServer, send: Send, make: Callable[[Any], Any]) -> None:
-    """Send `make(event)` when a user clicks into the scene."""
+def on_scene_click(server: viser.ViserServer, send: Send, make: Callable[[Any], Any], modifier: Any = None) -> None:
+    """Send `make(event)` when a user clicks into the scene, with a key such as "shift" held down if one is named."""
 
     async def clicked(event: Any) -> None:
         send(make(event))
 
     handler: Any = clicked  # viser awaits it; its annotation speaks of plain functions only
-    server.scene.on_click()(handler)
+    server.scene.on_click(modifier=modifier)(handler)
 
 
 def on_upload(handle: Any, send: Send, make: Callable[[Any], Any]) -> None:
@@ -77,6 +78,22 @@ def set_to(handle: Any, **properties: Any) -> None:
             setattr(handle, key, value)
 
 
+def show_tab(client: viser.ClientHandle, label: str) -> None:
+    """Bring the tab of that name to the front in one browser; this version of viser has no call for it, so the page presses it itself."""
+    connection, message = getattr(client, "_websock_connection", None), getattr(_messages, "RunJavascriptMessage", None)
+    if connection is None or message is None:
+        log.warning("this version of viser cannot bring a tab to the front")
+        return
+    find = f"[...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent.trim() === {json.dumps(label)})"
+    press = "if (tab) { tab.click(); clearInterval(waiting); }"
+    connection.queue_message(
+        message(
+            source=f"{{let tries = 0; const waiting = setInterval(() => {{ const tab = {find}; {press} "
+            f"if (++tries > 100) clearInterval(waiting); }}, 100);}}"
+        )
+    )
+
+
 def close_share_tunnel(server: viser.ViserServer) -> None:
     """No browser may ask this program to open itself to the internet: the handler goes, not just its button."""
     websock = getattr(server, "_websock_server", None)
@@ -84,3 +101,14 @@ def close_share_tunnel(server: viser.ViserServer) -> None:
         log.warning("this version of viser has no share handler to close")
         return
     websock.unregister_handler(_messages.ShareUrlRequest)
+
+
+def on_submit(form: Any, send: Send, make: Callable[[], Any]) -> None:
+    """Send `make()` when a form is submitted, by Enter or by its button."""
+
+    async def submitted(event: Any) -> None:
+        command = make()
+        if command is not None:
+            send(command)
+
+    form.on_submit(submitted)

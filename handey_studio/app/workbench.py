@@ -16,12 +16,14 @@ from handey_studio.app.commands import CameraMoved, Tell, Viewers
 from handey_studio.app.explaining import Explainer
 from handey_studio.app.handling import Handler
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows
+from handey_studio.app.modelling.workers import modelling_workers
 from handey_studio.app.palette import BLUE, TEAL, VERMILLION
 from handey_studio.app.planner import Failed, Finished, Planner, Progressed, Run, Shown
 from handey_studio.app.playback import Tick
 from handey_studio.app.scene.units import SCALE, metres
 from handey_studio.app.state import State, opened
 from handey_studio.app.view import View
+from handey_studio.app.wire import show_tab
 from handey_studio.base import BadInput
 from handey_studio.session import Session
 from handey_studio.world import Library
@@ -48,7 +50,7 @@ class Workbench:
         self._running = threading.Event()
         self._running.set()
         self.planner = Planner(run, lambda message: self.send(heard(message)), prepare)
-        self._background = (Explainer(self.send), Handler(self.send))
+        self._background = (Explainer(self.send), Handler(self.send), *modelling_workers(self.send))
         self._view = View(server, self.send)
         self._start_from(session.view.camera_position, session.view.camera_look_at)
         self._view.render(None, self.state)
@@ -148,6 +150,7 @@ class Workbench:
 
     def _arrived(self, client: viser.ClientHandle) -> None:
         self.send(Viewers(1))
+        show_tab(client, "Model" if self.state.model.open else "Move")
 
         def moved(camera: viser.CameraHandle) -> None:
             self._camera = CameraMoved(metres(camera.position), metres(camera.look_at))

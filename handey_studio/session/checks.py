@@ -22,7 +22,7 @@ MAX_PARTS, MAX_COMMANDS, MAX_RESULTS, MAX_BODIES = 200, 500, 500, 500
 MAX_MAP_SIDE, MAX_CELL_M = 4000, 0.05
 MAX_COORDINATE_M = 1e3
 MOST_TURN = 20.0  # [rad] hand angles are told from the grasp plane's axes, at most a few turns on
-ANY_NUMBER = ("elevation",)  # arrays in which NaN says that nothing was read
+ANY_NUMBER = ("elevation", "depth")  # arrays in which NaN says that nothing was read
 
 
 def check_session(session: Session) -> None:

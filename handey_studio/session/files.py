@@ -5,8 +5,10 @@ import io
 import os
 import re
 import zlib
+from dataclasses import MISSING, field, fields, make_dataclass, replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import msgspec
 
@@ -14,13 +16,14 @@ from handey_studio.base import BadInput
 from handey_studio.base.coding import from_plain, to_plain
 from handey_studio.base.errors import unknown_name
 from handey_studio.base.files import replace_file
+from handey_studio.modeling.draft_files import draft_from_plain, draft_to_plain
 from handey_studio.session.checks import check_name, check_session
 from handey_studio.session.session import Session
 from handey_studio.session.upgrade import upgraded
 from handey_studio.world import Library
 
 SCHEMA = "handey/session/"
-VERSION = 2
+VERSION = 3
 SUFFIX = ".handey"
 MAX_FILE_BYTES = 64_000_000
 MAX_CONTENT_BYTES = 256_000_000
@@ -30,7 +33,10 @@ GZIP_MAGIC = b"\x1f\x8b"
 def session_to_bytes(session: Session) -> bytes:
     """What the file holds. The same session gives the same bytes."""
     check_session(session)
-    content = msgspec.json.encode({"schema": f"{SCHEMA}{VERSION}"} | to_plain(session))
+    plain = to_plain(replace(session, draft=None))
+    if session.draft is not None:
+        plain |= {"draft": draft_to_plain(session.draft)}
+    content = msgspec.json.encode({"schema": f"{SCHEMA}{VERSION}"} | plain)
     if len(content) > MAX_CONTENT_BYTES:
         raise BadInput(f'session "{session.name}" holds {len(content)} bytes, the limit is {MAX_CONTENT_BYTES}; start a new one.')
     if b'"base64"' not in content:
@@ -43,7 +49,9 @@ def session_from_bytes(data: bytes, source: str) -> Session:
     try:
         plain = _decoded(_inflated(data))
         check_version(plain)
-        session = from_plain(upgraded({key: value for key, value in plain.items() if key != "schema"}), Session)
+        draft = None if plain.get("draft") is None else draft_from_plain(plain["draft"])
+        rest = from_plain(upgraded({key: value for key, value in plain.items() if key not in ("schema", "draft")}), _without_draft())
+        session = Session(**{f.name: getattr(rest, f.name) for f in fields(rest)}, draft=draft)
         check_session(session)
     except BadInput as error:
         raise BadInput(f'session "{source}" cannot be opened: {error}') from None
@@ -92,6 +100,18 @@ def find_session(library: Library, name: str | os.PathLike) -> Path:
 def own_file(library: Library, name: str) -> Path:
     """Where the library keeps a user's own session of that name."""
     return library.folder / "sessions" / f"{check_name(name)}{SUFFIX}"
+
+
+@lru_cache(maxsize=1)
+def _without_draft() -> Any:
+    """A session's fields but the draft, whose steps and scans are of several kinds and have a plain form of their own."""
+    kinds = get_type_hints(Session)
+    return make_dataclass("Session", [(f.name, kinds[f.name], _same_default(f)) for f in fields(Session) if f.name != "draft"])
+
+
+def _same_default(known: Any) -> Any:
+    made = known.default_factory is not MISSING
+    return field(default_factory=known.default_factory) if made else field(default=known.default)
 
 
 def check_version(plain: Any) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.cell.workcell import SimulatedSetup, Workcell
+from handey_studio.modeling.draft import Draft
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.task.plan import MoveCommand, MoveResult
 from handey_studio.task.sense import Scene
@@ -67,6 +68,7 @@ class Session(Value):
     `parts` are the models that `workcell.parts` names. `scene` and `results` are what sensing and planning found,
     empty before. `states` tells how far each of the commands is, one each, or none while they were never run as a list.
     `cell_now` is where the simulated bodies stand after what was executed, None while nothing was; only the cell reads it.
+    `draft` is the part that is being modelled, None while none is.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Session(Value):
     results: tuple[MoveResult, ...] = ()
     states: tuple[CommandState, ...] = ()
     cell_now: SimulatedSetup | None = None
+    draft: Draft | None = None
     view: ViewState = field(default_factory=ViewState)
 
     @property

@@ -6,7 +6,8 @@ CARRY = ("T_world_part_start", "T_world_part_goal", "grasp", "approach", "space"
 
 
 def upgraded(plain: dict[str, Any]) -> dict[str, Any]:
-    """Format 1 had plans of one carry, whose values stood in the plan itself. What is not as expected is left for the checks to refuse."""
+    """Format 1 had plans of one carry, whose values stood in the plan itself; format 2 had no model in the making. What is not as expected
+    is left for the checks to refuse."""
     results = plain.get("results")
     return plain | {"results": [_result(result) for result in results]} if isinstance(results, list) else plain
 

@@ -123,13 +123,13 @@ def test_hostile_json_never_escapes_as_anything_but_a_sentence(full, data):
 
 
 def test_a_newer_version_is_refused_clearly(fresh):
-    sentence = refused(plain_of(fresh) | {"schema": "handey/session/3"})
-    assert "format 3" in sentence and "up to 2" in sentence and "update" in sentence
+    sentence = refused(plain_of(fresh) | {"schema": "handey/session/4"})
+    assert "format 4" in sentence and "up to 3" in sentence and "update" in sentence
 
 
 @pytest.mark.parametrize("schema", [None, "", "handey/session/", "handey/session/one", "handey/move/1", 1, "handey/session/0"])
 def test_what_is_no_session_is_refused(fresh, schema):
-    assert "handey/session/2" in refused(plain_of(fresh) | {"schema": schema})
+    assert "handey/session/3" in refused(plain_of(fresh) | {"schema": schema})
 
 
 def test_a_skewed_frame_is_refused_by_its_path(full):

@@ -27,8 +27,8 @@ class PileScene:
         if old is None or _setup(old.session) is not _setup(new.session):
             self._build(new.session)
             old = None
-        shown = new.session.scan is None
-        if old is None or shown != (old.session.scan is None):
+        shown = _shown(new)
+        if old is None or shown != _shown(old):
             for frame in self._frames:
                 frame.visible = shown
 
@@ -43,6 +43,10 @@ class PileScene:
             for number, (body, part) in enumerate(solids)
             if part is not None
         ]
+
+
+def _shown(state: State) -> bool:
+    return state.session.scan is None and not state.model.open
 
 
 def solid_of(session: Session, body: TrueBody) -> Part | None:

@@ -21,9 +21,11 @@ class WorkcellScene:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._blocks: list[viser.BoxHandle] = []
+        self._root = server.scene.add_frame("/workcell", show_axes=False)
         _light(server)
 
     def render(self, old: State | None, new: State) -> None:
+        self._root.visible = not new.model.open
         if old is not None and old.session.workcell is new.session.workcell:
             return
         scene, workcell = self._server.scene, new.session.workcell

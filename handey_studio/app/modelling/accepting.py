@@ -1,0 +1,55 @@
+"""The one thing that Enter and the blue button do: what is offered is taken, or the tool does its work. And Esc: less of it."""
+
+from dataclasses import dataclass, replace
+
+from handey_studio.app.actions import Bench, CancelMove
+from handey_studio.app.modelling import derived
+from handey_studio.app.modelling.look import SELECT
+from handey_studio.app.modelling.steps import AcceptAlignment, TakeModel
+from handey_studio.app.modelling.tools import CUT, EXTRUDE, FINISHED, MIRROR, POINTS, SKETCH, ChooseTool, FinishTool
+from handey_studio.app.state import State
+from handey_studio.session.model_look import proposals
+
+TOOL_LABELS = {SKETCH: "Close the outline", EXTRUDE: "Extrude", CUT: "Cut", MIRROR: "Mirror it", POINTS: "Align by these points"}
+
+
+@dataclass(frozen=True)
+class Accept:
+    """What is offered is taken, or the active tool does its work."""
+
+    def apply(self, state: State) -> State:
+        if derived.draft_of(state) is None:
+            return state
+        if state.model.tool != SELECT:
+            return FinishTool().apply(state)
+        if proposals(derived.alignment(state)):
+            return AcceptAlignment().apply(state)
+        found = derived.suggestion(state)
+        return TakeModel().apply(state) if found is not None and found.solid is not None else state
+
+
+@dataclass(frozen=True)
+class Escape:
+    """A job is stopped; else the tool is put down; else nothing is selected."""
+
+    def run(self, bench: Bench) -> State:
+        state = bench.state
+        if state.job is not None:
+            return CancelMove().run(bench)
+        if not state.model.open:
+            return state
+        if state.model.clicks or state.model.drawing is not None:
+            return replace(state, model=replace(state.model, clicks=(), drawing=None))
+        return ChooseTool(SELECT).apply(replace(state, model=replace(state.model, step=None, check=-1)))
+
+
+def accept_label(state: State) -> str:
+    """What the blue button does now; empty when there is nothing to accept."""
+    if derived.draft_of(state) is None or state.job is not None:
+        return ""
+    if state.model.tool != SELECT:
+        return TOOL_LABELS.get(state.model.tool, "") if state.model.tool in FINISHED else ""
+    if proposals(derived.alignment(state)):
+        return "Accept this alignment"
+    found = derived.suggestion(state)
+    return "Take this model" if found is not None and found.solid is not None else ""

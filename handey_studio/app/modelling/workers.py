@@ -1,0 +1,81 @@
+"""What is worked out of a model away from the loop: planar faces, suggestions, alignments, truth, and what uploaded files hold."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from numpy.typing import NDArray
+
+from handey_studio.app.background import Background
+from handey_studio.app.modelling import derived
+from handey_studio.app.modelling.look import Worked
+from handey_studio.app.modelling.scanning import ScanRead
+from handey_studio.app.state import State
+from handey_studio.geometry import Polyhedron
+from handey_studio.modeling.patches import Patches
+from handey_studio.modeling.patches_finding import patches_of
+from handey_studio.modeling.scans import Scan
+from handey_studio.modeling.suggest import suggest
+from handey_studio.modeling.suggestion import Suggestion
+from handey_studio.modeling.truth import truth
+from handey_studio.modeling.truth_values import Truth
+from handey_studio.session.model_files import scan_of_upload
+
+KEPT_PATCHES = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Segmented:
+    """The planar faces of a scan were found."""
+
+    worked: Worked
+
+    def apply(self, state: State) -> State:
+        return replace(state, model=replace(state.model, patches=(*state.model.patches, self.worked)[-KEPT_PATCHES:]))
+
+
+@dataclass(frozen=True, eq=False)
+class WorkedOut:
+    """Something was worked out under a name."""
+
+    name: str
+    worked: Worked
+
+    def apply(self, state: State) -> State:
+        others = tuple(entry for entry in state.model.worked if entry[0] != self.name)
+        return replace(state, model=replace(state.model, worked=(*others, (self.name, self.worked))))
+
+
+def modelling_workers(send: Callable[[Any], None]) -> tuple[Background, ...]:
+    """One worker for each thing that a model wants worked out."""
+    segmenter = Background(send, derived.to_segment, patches_of, lambda asked, found: Segmented(Worked(asked, found)))
+    reader = Background(send, _to_read, scan_of_upload, lambda asked, said: ScanRead(asked[0], said))
+    return (
+        segmenter,
+        reader,
+        _worker(send, derived.SUGGESTION, derived.to_suggest, suggested),
+        _worker(send, derived.TRUTH, derived.to_judge, judged),
+    )
+
+
+def suggested(
+    scans: tuple[Scan, ...], poses: tuple[tuple[str, NDArray], ...], at: tuple[int, float, float] | None, *patches: Patches
+) -> Suggestion:
+    """The model that the scans suggest; `poses` are those of the scans by name."""
+    known = dict(poses)
+    return suggest(scans, [known[scan.name] for scan in scans], at, patches)
+
+
+def judged(solid: Polyhedron, scans: tuple[Scan, ...], poses: tuple[tuple[str, NDArray], ...]) -> Truth:
+    """How a solid agrees with the scans that are aligned."""
+    known = dict(poses)
+    aligned = tuple(scan for scan in scans if scan.name in known)
+    return truth(solid, aligned, tuple(known[scan.name] for scan in aligned))
+
+
+def _to_read(state: State) -> tuple | None:
+    return None if state.model.reading is None else (state.model.reading,)
+
+
+def _worker(send: Callable[[Any], None], name: str, wanted: Callable[[State], tuple | None], work: Callable[..., Any]) -> Background:
+    return Background(send, wanted, work, lambda asked, found: WorkedOut(name, Worked(asked, found)))

@@ -1,0 +1,1 @@
+"""The model in the making, in the scene."""

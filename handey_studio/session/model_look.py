@@ -1,0 +1,104 @@
+"""What the screen needs to know of a model in the making: where its scans stand, what can be clicked, how assumed faces are hatched."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from handey_studio.base import frozen_array
+from handey_studio.geometry import Polyhedron
+from handey_studio.geometry.transforms import apply, transform
+from handey_studio.modeling.draft import Draft
+from handey_studio.modeling.patches import Patches
+from handey_studio.modeling.replay import Built, replay
+from handey_studio.modeling.scans import Scan
+from handey_studio.modeling.snapping import Pickable, pickable
+from handey_studio.modeling.suggestion import Alignment
+
+GAP_M = 0.03  # between a scan that is not aligned yet and those beside it
+HATCH_M = 0.004
+ASSUMED = "assumed"
+
+
+@lru_cache(maxsize=32)
+def built_of(draft: Draft, steps: int) -> Built:
+    """What the first so many steps of a draft make."""
+    return replay(Draft(draft.name, draft.scans, draft.operations[:steps]))
+
+
+@lru_cache(maxsize=16)
+def shown_poses(draft: Draft, alignment: Alignment | None, alternative: int) -> tuple[NDArray, ...]:
+    """T_model_scan (4, 4) at which each scan is shown: where it is aligned, else as proposed, else beside the others."""
+    known = built_of(draft, len(draft.operations)).Ts_model_scan
+    poses: list[NDArray] = []
+    for number, scan in enumerate(draft.scans):
+        pose = known.get(scan.name)
+        if pose is None:
+            proposed = proposals(alignment)
+            pose = proposed[alternative % len(proposed)] if proposed else _beside(draft.scans[:number], poses, scan)
+        poses.append(pose)
+    return tuple(poses)
+
+
+def proposals(alignment: Alignment | None) -> tuple[NDArray, ...]:
+    """The poses that an alignment offers, best first; none when nothing fits."""
+    if alignment is None or alignment.T_model_scan is None:
+        return ()
+    return (alignment.T_model_scan, *(pose for pose, _ in alignment.others))
+
+
+def unaligned(draft: Draft) -> Scan | None:
+    """The first scan whose pose no step tells yet."""
+    known = built_of(draft, len(draft.operations)).Ts_model_scan
+    return next((scan for scan in draft.scans if scan.name not in known), None)
+
+
+@lru_cache(maxsize=4)
+def clickable(scans: tuple[Scan, ...], poses: tuple[bytes, ...], patches: tuple[Patches | None, ...], solid: Polyhedron | None) -> Pickable:
+    """Everything that a click can meet; `poses` are the bytes of T_model_scan."""
+    return pickable(scans, tuple(np.frombuffer(pose).reshape(4, 4) for pose in poses), patches, solid)
+
+
+def points_of(scan: Scan, T_model_scan: NDArray) -> NDArray:
+    """A scan's readings (n, 3) [m] in the model's frame."""
+    return apply(T_model_scan, _readings(scan))
+
+
+@lru_cache(maxsize=16)
+def hatching(solid: Polyhedron, faces: tuple[int, ...], spacing: float = HATCH_M) -> NDArray:
+    """Slanting lines (n, 2, 3) [m] across faces of a solid."""
+    lines = [_hatched(solid, face, spacing) for face in faces]
+    return frozen_array(np.concatenate(lines) if lines else np.empty((0, 2, 3)))
+
+
+def assumed_faces(sources: Sequence[str]) -> tuple[int, ...]:
+    """Numbers of the faces that no scan has shown."""
+    return tuple(number for number, source in enumerate(sources) if source.startswith(ASSUMED))
+
+
+def _hatched(solid: Polyhedron, face: int, spacing: float) -> NDArray:
+    T = solid.face_frame(face)
+    slant = transform([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]] / np.sqrt(2.0))
+    T = T @ slant
+    polygon = solid.face_polygon(face, T)
+    x0, y0, x1, y1 = polygon.bounds
+    rows = np.arange(np.ceil(y0 / spacing) * spacing, y1, spacing)
+    long = shapely.linestrings(np.stack([np.c_[np.full_like(rows, x0 - 1.0), rows], np.c_[np.full_like(rows, x1 + 1.0), rows]], axis=1))
+    pieces = [piece for piece in shapely.get_parts(shapely.intersection(long, polygon)) if piece.geom_type == "LineString"]
+    ends = np.array([shapely.get_coordinates(piece)[[0, -1]] for piece in pieces if not piece.is_empty]).reshape(-1, 2, 2)
+    return T[:3, 3] + ends @ T[:3, :2].T
+
+
+def _beside(scans: Sequence[Scan], poses: Sequence[NDArray], scan: Scan) -> NDArray:
+    """Beside all others along x, so that points can be picked on both."""
+    right = max((float(points_of(other, pose)[:, 0].max()) for other, pose in zip(scans, poses, strict=False)), default=0.0)
+    return frozen_array(transform(None, (right + GAP_M - float(_readings(scan)[:, 0].min()), 0.0, 0.0)))
+
+
+@lru_cache(maxsize=16)
+def _readings(scan: Scan) -> NDArray:
+    """Readings (n, 3) [m] in the scan's own world."""
+    points = apply(scan.view.T_world_sensor, scan.view.points_sensor())
+    return frozen_array(points[np.isfinite(points[..., 2])])
