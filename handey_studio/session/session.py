@@ -16,6 +16,7 @@ from handey_studio.world import Library, Part, PlacedPart
 
 LAYERS = (
     "robot",
+    "planned arm",
     "depth map",
     "located parts",
     "data edges",
@@ -29,6 +30,7 @@ LAYERS = (
     "configuration space",
     "wrist box",
     "destination",
+    "plots",
     "labels",
 )
 
@@ -37,7 +39,8 @@ LAYERS = (
 class ViewState(Value):
     """How the user was looking: the camera in the world [m], the timeline's time [s], what is selected and what is hidden.
 
-    `hypothesis` and `edge` count into what was sensed, -1 for none; `result` counts the session's results, -1 for the last.
+    `hypothesis` and `edge` count into what was sensed, -1 for none; `result` counts the session's
+    results and `attempt` that result's attempts, -1 for the last.
     """
 
     camera_position: NDArray = field(default_factory=lambda: np.array([1.56, -1.10, 0.98]))
@@ -46,6 +49,7 @@ class ViewState(Value):
     hypothesis: int = -1
     edge: int = -1
     result: int = -1
+    attempt: int = -1
     hidden_layers: tuple[str, ...] = ("configuration space",)
 
     def __post_init__(self) -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from handey_studio.base import Ledger
+from handey_studio.cell.recording import Event, Recording, Tracking
 from handey_studio.cell.workcell import Workcell
 from handey_studio.geometry.transforms import from_xyz_rpy, inverse
 from handey_studio.grasping import BumpRun, GraspPlane
@@ -12,7 +13,9 @@ from handey_studio.localization import DataEdge, Hypothesis, LocateResult
 from handey_studio.motion import Certificate
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session import Session, new_session
-from handey_studio.task.plan import Carry, GraspChoice, MoveCommand, MovePlan, MoveResult, Step
+from handey_studio.task.performance import Check, Incident, Performance, Performed, Recovery
+from handey_studio.task.plan import Attempt, Carry, GraspChoice, MoveCommand, MovePlan, MoveResult, Step
+from handey_studio.task.ruled_out import RuledOut
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, PlacedPart, Robot, arm_of
 
@@ -88,6 +91,23 @@ def line(robot: Robot, kind, start, end, opening, T_hand_part=None, held=None) -
     return Step(kind, robot.joint_names, 2.0 * s, q, openings, held, T_hand_part, (), clearances)
 
 
+def hand_made_performance(plan: MovePlan, until: int | None = None, incident: Incident | None = None) -> Performance:
+    """A plan carried out in its own time up to a step: each joint lags 2 mrad behind, a held part weighs 5 N, touching shows as 8 N."""
+    steps, performed, start = plan.steps[:until], [], 0.0
+    for number, step in enumerate(steps):
+        n = len(step.time_s)
+        weight = np.where(step.held is not None, 5.0, 0.0) + np.where(np.arange(n) == n - 1, 3.0, 0.0) * (step.kind == "transfer")
+        force = np.c_[np.zeros((n, 2)), -np.broadcast_to(weight, n)]
+        touched = step.kind == "close" and not (incident and incident.kind == "missed")
+        events = (Event(float(step.time_s[-1]), "touch", 8.0),) if step.kind in ("close", "transfer") else ()
+        recording = Recording(
+            step.time_s, step.q_rad - 0.002, step.q_rad, step.hand_opening_m, np.full(n, 20.0), force, np.zeros((n, 3)), events
+        )
+        performed.append(Performed(number, step.kind, start, "contact" if touched else "arrived", recording, Tracking(0.002, 1.5)))
+        start += float(step.time_s[-1]) + 0.5
+    return Performance(tuple(performed), (incident,) if incident else ())
+
+
 def ledger():
     """A few entries of two stages, one of which fell without a number."""
     book = Ledger()
@@ -119,3 +139,21 @@ def full_session(folder) -> Session:
     located = (PlacedPart("l_block#1", session.parts[0], T_START), brick)
     scene = Scene(hand_made_scan(), LocateResult((), hand_made_edges(), hand_made_hypotheses(), ()), located)
     return replace(session, scene=scene, results=(result,))
+
+
+def performed_session(folder) -> Session:
+    """A session whose MOVE was done at the second attempt: in the first the part was dropped on the way."""
+    session = full_session(folder)
+    planned = session.results[0]
+    assert planned.plan is not None
+    dropped = Incident("dropped", 2, "the part fell out of the fingers", 0.002, 0.0375, "m")
+    first = hand_made_performance(planned.plan, 3, dropped)
+    why = "what fell can be taken up again: 2 of 3 attempts are left"
+    recovery = Recovery(
+        dropped, why, ("the hand went home", "the table was scanned anew"), RuledOut("grasp", "it slipped out of this grasp")
+    )
+    check = Check("seen where it was to be", planned.plan.T_world_part_goal, 0.0004, 0.002)
+    second = replace(hand_made_performance(planned.plan), check=check)
+    attempt = Attempt(planned.plan, first, recovery)
+    done = replace(planned, status="done", performance=second, attempts=(attempt,), T_world_part_reached=check.T_world_part, physics=True)
+    return replace(session, results=(done,))
