@@ -11,6 +11,7 @@ from handey_studio.sensing.depth_view import DepthView
 GAP_PX = 5  # readings of two patches so near in a row or column may be beside their crease
 NEAR_SIGMAS, NEAR_PX = 6.0, 3.0  # and so near in space, in deviations and pixels' sizes
 LEAST_READINGS = 5
+LONG_CREASE = 8.0  # readings beside a crease by the root of the smaller patch's: patches of two bodies touch more shortly
 
 
 def creases_of(view: DepthView, points: NDArray, labels: NDArray, planes: NDArray, sigma: NDArray) -> tuple[Crease, ...]:
@@ -45,7 +46,7 @@ def _is_convex(planes: NDArray, middles: NDArray, a: int, b: int) -> bool:
 def bodies_of(labels: NDArray, creases: tuple[Crease, ...], count: int) -> tuple[tuple[int, ...], ...]:
     """Patch numbers of each body, that with most readings first."""
     readings = np.bincount(labels[labels >= 0], minlength=count)
-    joined = [(c.a, c.b) for c in creases if c.convex]
+    joined = [(c.a, c.b) for c in creases if c.convex and c.readings > LONG_CREASE * np.sqrt(min(readings[c.a], readings[c.b]))]
     rows, columns = np.array(joined, dtype=int).reshape(-1, 2).T
     _, body = connected_components(coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)), directed=False)
     members = [tuple(int(k) for k in np.nonzero(body == number)[0]) for number in np.unique(body)]

@@ -17,8 +17,8 @@ from handey_studio.sensing.depth_view import DepthView, Pinhole
 from handey_studio.sensing.facets import sigma_at
 
 ON_SUPPORT_SIGMAS = 4.5
-INNER_PX = 2  # beside edges sensors smooth: planes are fitted without them where enough is left
-INNER_SHARE = 0.4
+INNER_PX = 3
+INNER_SHARE = 0.25
 PARTS = 6  # a patch is cut into so many along each way to see how it bends
 
 

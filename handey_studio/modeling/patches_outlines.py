@@ -21,6 +21,8 @@ SIMPLE_PX, RAGGED = 1.5, 1.2  # a contour's side may leave a straight line by so
 COARSER = (1.0, 1.6, 2.5)  # times as much where the sides would cross one another
 SHORT = 3.5  # slacks: a shorter side may be a rounded corner
 MEET_SLACKS, MEET_PX = 6.0, 8.0  # lines that meet farther from their corner do not make it
+MOST_LOST_M = 0.0025  # depth cameras lose 3 to 5 mm; what is measured beyond comes from other things beside the outlines
+MOST_SLANT = 2.0  # surfaces seen flatly lose more of their rims, up to so many times as much
 LOST_UNSURE = 0.35  # what a sensor loses at rims is known to so much of it
 TRIM = 0.12  # of a side at each end belongs to the corner
 SAME_SURFACE_SIGMAS = 6.0
@@ -51,7 +53,7 @@ def lost_at_rims(view: DepthView) -> float:
     """How far [m] the true outline lies outside the middles of the outermost readings: half a pixel, and what depth cameras lose."""
     depth = view.depth[np.isfinite(view.depth)]
     pixel = 1.0 / float(view.projection.pixels_per_metre(float(np.median(depth)) if len(depth) else 1.0))
-    return 0.5 * pixel + max(0.0, view.outline_error - pixel)
+    return 0.5 * pixel + float(np.clip(view.outline_error - pixel, 0.0, MOST_LOST_M))
 
 
 def outlines_of(seen: Seen, number: int) -> list[Outline]:
@@ -185,7 +187,8 @@ def _side(
             return Border("crease" if kind == "c" else "foot", other), crease
         kind = "u"
     if kind in "riu":
-        lost_px = seen.lost_m * pixels_per_m
+        slant = float(np.clip(per_px * pixels_per_m, 1.0, MOST_SLANT))
+        lost_px = 0.5 + max(0.0, seen.lost_m * pixels_per_m - 0.5) * slant
         middle = middle + outward * lost_px * _outward_sign(seen, number, middle, outward)
         sigma_px = float(np.hypot(sigma_px, LOST_UNSURE * lost_px))
     names = {"r": "rim", "k": "cut", "i": "image", "u": "rim"}

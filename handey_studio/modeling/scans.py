@@ -8,7 +8,7 @@ import numpy as np
 from handey_studio.base import BadInput, Value
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.sensing.depth_view import DepthView
-from handey_studio.sensing.files import read_depth
+from handey_studio.sensing.files import DepthReading, read_depth
 from handey_studio.sensing.support import support_plane
 
 
@@ -45,6 +45,9 @@ def read_scan(
 
     Raises BadInput with one sentence.
     """
-    reading = read_depth(depth_path, camera_path, cloud_unit)
-    source = os.fspath(depth_path)
+    return scan_of_reading(name, read_depth(depth_path, camera_path, cloud_unit), os.fspath(depth_path), rng)
+
+
+def scan_of_reading(name: str, reading: DepthReading, source: str, rng: np.random.Generator | None = None) -> Scan:
+    """What was read from a file as a scan; the support is found where the file does not tell its world. Raises BadInput."""
     return Scan(name, reading.view, source) if reading.knows_world else scan_of_view(name, reading.view, source, rng)

@@ -14,19 +14,21 @@ from handey_studio.modeling.patches_finding import patch_at, patches_of
 from handey_studio.modeling.patches_outlines import lost_at_rims
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.suggest_fit import Fit, Rays, fit_of, rays_of
-from handey_studio.modeling.suggest_planes import Body, BodyPlane, Clue, Squared, clues_of, planes_of_body, square_frame, squared
+from handey_studio.modeling.suggest_planes import Body, BodyPlane, Squared, clues_of, planes_of_body, square_frame, squared
 from handey_studio.modeling.suggest_shapes import Shape, shapes_of
 from handey_studio.modeling.suggestion import Relation, Suggestion
 
 SAME_PLANE_M, SAME_PLANE_COSINE = 0.0006, np.cos(np.deg2rad(0.5))  # a face of the solid and the plane that it was made from
 SHORT_LOSSES = 4.0  # sides of outlines shorter than so many times what is lost at rims are raggedness
+SQUARE_COSINE = np.cos(np.deg2rad(0.1))  # a face along the object's own directions
 MARGIN_M = 0.02  # around an object's readings rays are held against a candidate
 
 
 @dataclass(frozen=True)
 class SuggestOptions:
     """`least_explained`: the share of the object's readings that a solid must explain; `most_through`: the share of the rays to it that may
-    be seen to pass; `through_cost` and `face_cost` what these and each face take off the share explained when candidates are compared;
+    be seen to pass; `through_cost` and `face_cost` what these, and each face, twice for one out of square, take off the share explained
+    when candidates are compared;
     `least_share` of the largest patch's readings makes a patch count."""
 
     least_explained: float = 0.85
@@ -68,13 +70,18 @@ def suggest_all(scan: Scan, patches: Patches | None = None, options: SuggestOpti
 
 
 def suggest_object(
-    scans: Sequence[Scan], Ts: Sequence[NDArray], patches: Sequence[Patches], scan: int, number: int, options: SuggestOptions
+    scans: Sequence[Scan],
+    Ts: Sequence[NDArray],
+    patches: Sequence[Patches],
+    scan: int,
+    number: int,
+    options: SuggestOptions = SuggestOptions(),
 ) -> Suggestion:
     """The suggestion for object `number` of scan `scan`, with what the other scans show of it."""
     body = Body(patches, Ts, _members(patches, Ts, scan, number, options))
     raw = clues_of(body)
     frame = square_frame(raw)
-    pairs = [squared(clue, frame) for clue in raw]
+    pairs = [squared(clue, frame, body.ring(clue.of)) for clue in raw]
     clues = [clue for clue, _ in pairs]
     planes = planes_of_body(clues)
     short = SHORT_LOSSES * max(lost_at_rims(scans[k].view) for k, _ in body.members)
@@ -82,7 +89,7 @@ def suggest_object(
     ledger, best = Ledger(), None
     for shape in shapes_of(body, clues, planes, frame, short):
         fit = None if shape.solid is None else fit_of(shape.solid, views)
-        value = _judged(ledger, shape, fit, options)
+        value = _judged(ledger, shape, fit, frame, options)
         if shape.solid is not None and fit is not None and value is not None and (best is None or value > best[0]):
             best = (value, shape.solid, fit)
     if best is None:
@@ -139,21 +146,22 @@ def _views(scans: Sequence[Scan], body: Body) -> list[Rays]:
     return views
 
 
-def _judged(ledger: Ledger, shape: Shape, fit: Fit | None, options: SuggestOptions) -> float | None:
+def _judged(ledger: Ledger, shape: Shape, fit: Fit | None, frame: NDArray, options: SuggestOptions) -> float | None:
     """Writes the candidate down; how good it is, None if it fell."""
     if fit is None:
         ledger.add("suggest", shape.option, shape.reason, value=shape.value, limit=shape.limit, unit=shape.unit)
         return None
+    shares = (
+        (options.least_explained - fit.explained, "too few of the object's readings lie on it", fit.explained, options.least_explained),
+        (fit.through - options.most_through, "the sensor saw through it", fit.through, options.most_through),
+    )
+    for excess, reason, value, limit in shares:
+        if excess > 0:
+            ledger.add("suggest", shape.option, reason, value=value, limit=limit, unit="share")
+            return None
+    odd = 0 if shape.solid is None else int((np.abs(shape.solid.normals @ frame.T).max(axis=1) < SQUARE_COSINE).sum())
     faces = 0 if shape.solid is None else len(shape.solid.faces)
-    if fit.explained < options.least_explained:
-        told = {"value": fit.explained, "limit": options.least_explained}
-        ledger.add("suggest", shape.option, "too few of the object's readings lie on it", unit="share", **told)
-        return None
-    if fit.through > options.most_through:
-        told = {"value": fit.through, "limit": options.most_through}
-        ledger.add("suggest", shape.option, "the sensor saw through it", unit="share", **told)
-        return None
-    value = fit.explained - options.through_cost * fit.through - options.face_cost * faces
+    value = fit.explained - options.through_cost * fit.through - options.face_cost * (faces + odd)
     ledger.add("suggest", shape.option, value=value, unit="share")
     return value
 
@@ -197,6 +205,3 @@ def _relations(solid: Polyhedron, planes: Sequence[BodyPlane], squares: Sequence
                 relations.append(Relation(square.kind, (f,), square.off, square.limit))
                 break
     return tuple(relations)
-
-
-__all__ = ["Clue", "SuggestOptions", "suggest", "suggest_all", "suggest_object"]

@@ -5,9 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
 
 from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import apply, inverse, rotate
+from handey_studio.modeling.patches_outlines import lost_at_rims
 from handey_studio.modeling.scans import Scan
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.sensing.facets import sigma_at
@@ -15,10 +17,11 @@ from handey_studio.sensing.facets import sigma_at
 ON_SIGMAS, ON_BEND_M = 4.0, 0.0025  # a reading so near lies on the solid: noise, and how cartons bulge, as far as the noise allows that
 THROUGH_SIGMAS = 6.0  # a reading so far behind it has seen through it
 MOST_RAYS = 20_000
+MARGIN_PX = 1.0
 
 
 class Fit(NamedTuple):
-    """`explained`: the share of the object's readings that lie on the solid; `through`: the share of the rays to it that a reading behind it
+    """`explained`: the share of the object's readings that lie on the solid; `through`: that of the rays to it that a reading behind it
     shows to pass; `rms` [m] of the readings on it; `rays` that it would stop."""
 
     explained: float
@@ -28,38 +31,44 @@ class Fit(NamedTuple):
 
 
 class Rays(NamedTuple):
-    """Rays of one scan in the model frame: `starts` and `steps` (n, 3), one step a metre of depth; `depth` (n,) [m] read, `sigma` (n,) [m];
-    `own` (n,) whether the reading is one of the object."""
+    """Rays of one scan in the model frame, row by row of an image of `shape`: `starts` and `steps` (n, 3), one step a metre deep; `depth`
+    (n,) [m] read, NaN for none, `sigma` (n,) [m]; `own` (n,) whether the reading is one of the object. Within `margin` rays of a
+    silhouette a reading behind tells nothing, as sensors lose what is there."""
 
+    shape: tuple[int, int]
     starts: NDArray
     steps: NDArray
     depth: NDArray
     sigma: NDArray
     own: NDArray
+    margin: int
 
 
 def rays_of(scan: Scan, T_model_scan: NDArray, own: NDArray, corners_model: NDArray) -> Rays:
-    """The rays with readings around corners (n, 3) [m], every few of them; `own` (H, W) marks the object's readings."""
+    """The rays around corners (n, 3) [m], every few of them; `own` (H, W) marks the object's readings."""
     view = scan.view
     T = T_model_scan @ view.T_world_sensor
-    uv = view.projection.project(apply(inverse(T), corners_model))
+    marked = np.argwhere(own)[:, ::-1]
+    uv = np.concatenate([view.projection.project(apply(inverse(T), corners_model)), marked])
     height, width = view.depth.shape
-    marked = np.argwhere(own)
-    low = np.minimum(np.floor(np.nanmin(uv, axis=0)), marked[:, ::-1].min(axis=0) if len(marked) else np.inf)
-    high = np.maximum(np.ceil(np.nanmax(uv, axis=0)), marked[:, ::-1].max(axis=0) if len(marked) else -np.inf)
-    left, top = (int(v) for v in np.clip(low, 0, (width, height)))
-    right, bottom = (int(v) + 1 for v in np.clip(high, -1, (width - 1, height - 1)))
-    every = max(1, int(np.ceil(np.sqrt(max(0, right - left) * max(0, bottom - top) / MOST_RAYS))))
-    v, u = (grid.ravel() for grid in np.mgrid[top:bottom:every, left:right:every])
-    known = np.isfinite(view.depth[v, u])
-    u, v = u[known], v[known]
+    left, top = (int(v) for v in np.clip(np.floor(np.nanmin(uv, axis=0)), 0, (width - 1, height - 1)))
+    right, bottom = (int(v) + 1 for v in np.clip(np.ceil(np.nanmax(uv, axis=0)), (left, top), (width - 1, height - 1)))
+    every = max(1, int(np.ceil(np.sqrt((right - left) * (bottom - top) / MOST_RAYS))))
+    v, u = np.mgrid[top:bottom:every, left:right:every]
+    shape, u, v = v.shape, u.ravel(), v.ravel()
     uv, depth = np.stack([u, v], axis=1).astype(float), view.depth[v, u]
     near, far = (view.projection.unproject(uv, np.full(len(uv), d)) for d in (0.0, 1.0))
-    return Rays(apply(T, near), rotate(T, far - near), depth, _sigma(view, depth), own[v, u])
+    mine = own[v, u]
+    scale = float(view.projection.pixels_per_metre(float(np.median(depth[mine])) if mine.any() else 1.0))
+    margin = int(np.ceil((lost_at_rims(view) * scale + MARGIN_PX) / every))
+    return Rays(shape, apply(T, near), rotate(T, far - near), depth, _sigma(view, depth), mine, margin)
 
 
 def _sigma(view: DepthView, depth: NDArray) -> NDArray:
-    return sigma_at(view, depth) if len(depth) else np.empty(0)
+    known = np.isfinite(depth)
+    sigma = np.ones(len(depth))
+    sigma[known] = sigma_at(view, depth[known])
+    return sigma
 
 
 def fit_of(solid: Polyhedron, views: list[Rays]) -> Fit:
@@ -75,9 +84,10 @@ def fit_of(solid: Polyhedron, views: list[Rays]) -> Fit:
         with np.errstate(invalid="ignore"):
             behind = (rays.depth - depth) * cosine
             near = hit & rays.own & (np.abs(behind) < ON_SIGMAS * rays.sigma + np.minimum(ON_BEND_M, 1.5 * rays.sigma))
-            passed = hit & (rays.depth - depth > THROUGH_SIGMAS * rays.sigma + rays.sigma / np.maximum(cosine, 0.1))
-        own, on, stopped = own + int(rays.own.sum()), on + int(near.sum()), stopped + int(hit.sum())
-        seen_through += int((passed & ~near).sum())
+            passed = hit & (behind > THROUGH_SIGMAS * rays.sigma) & ~near
+        inner = binary_erosion(hit.reshape(rays.shape), np.ones((3, 3)), max(1, rays.margin)).ravel() & np.isfinite(rays.depth)
+        own, on, stopped = own + int(rays.own.sum()), on + int(near.sum()), stopped + int(inner.sum())
+        seen_through += int((passed & inner).sum())
         squares += float((behind[near] ** 2).sum())
     return Fit(on / max(own, 1), seen_through / max(stopped, 1), float(np.sqrt(squares / max(on, 1))), stopped)
 

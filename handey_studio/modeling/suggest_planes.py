@@ -19,6 +19,7 @@ LEAST_SQUARE_RAD, MOST_SQUARE_RAD = np.deg2rad(0.4), np.deg2rad(7.0)
 SAME_SIGMAS, LEAST_SAME_M = 3.0, 0.0004  # offsets of one plane
 SAME_RAD = np.deg2rad(3.0)  # normals of one plane, where they are not square
 LEVEL = 0.2  # sine of a face's slope: less is level
+WANDER = 1.5  # neighbouring readings of an outline err alike
 LEAST_SIDE_M = 0.003  # shorter sides tell no direction
 CERTAIN_M = 0.0001
 UP = np.array([0.0, 0.0, 1.0])
@@ -26,8 +27,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 class Clue(NamedTuple):
     """What tells of one plane: outward `normal` (3,), a `point` (3,) on it [m], how well its offset `sigma` [m] and its direction `tilt`
-    [rad] are known, `kind` "seen", "support", "rim" or "cut", its `size` [m], the (scan, patch) it is from (patch -1: the support), and for a
-    side of a patch's outline which (ring, side)."""
+    [rad] are known, `kind` "seen", "support", "rim" or "cut", its `size` [m], the (scan, patch) it is from (patch -1: the support), and for
+    a side of a patch's outline which (ring, side)."""
 
     normal: NDArray
     point: NDArray
@@ -41,12 +42,15 @@ class Clue(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BodyPlane(Value):
-    """A plane of an object in the model frame: outward unit `normal` · x = `offset` [m], known to `sigma` [m]. `kind` is the best of what
-    tells of it: "seen", "support" or "rim"; `size` [m] how much does; `of` names the (scan, patch) that lie on it, patch -1 for a support,
-    `sides` the outlines' sides, (scan, patch, ring, side), that end there."""
+    """A plane of an object in the model frame: outward unit `normal` · x = `offset` [m], known to `sigma` [m] around `middle` (3,).
+
+    `kind` is the best of what tells of it: "seen", "support" or "rim"; `size` [m] how much does; `of` names the (scan, patch) that lie on
+    it, patch -1 for a support, `sides` the outlines' sides, (scan, patch, ring, side), that end there.
+    """
 
     normal: NDArray
     offset: float
+    middle: NDArray
     sigma: float
     kind: str
     size: float
@@ -55,6 +59,7 @@ class BodyPlane(Value):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", frozen_array(self.normal))
+        object.__setattr__(self, "middle", frozen_array(self.middle))
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,10 @@ class Body(NamedTuple):
     def patch(self, of: tuple[int, int]) -> Patch:
         return self.patches[of[0]].patches[of[1]]
 
+    def ring(self, of: tuple[int, int]) -> NDArray:
+        """A patch's outline (n, 3) [m] in the model frame; nothing for a support."""
+        return apply(self.Ts_model_scan[of[0]], self.patch(of).rings[0]) if of[1] >= 0 else np.empty((0, 3))
+
     def of_all(self) -> list[tuple[int, int]]:
         return [(scan, patch) for scan, numbers in self.members for patch in numbers]
 
@@ -86,11 +95,14 @@ def clues_of(body: Body) -> list[Clue]:
     clues = []
     for scan, numbers in body.members:
         T = body.Ts_model_scan[scan]
-        clues.append(Clue(-rotate(T, UP), T[:3, 3].copy(), CERTAIN_M, np.deg2rad(0.05), "support", 0.0, (scan, -1)))
+        below = _stood_on(body, scan, numbers)
+        on_table = any(border.kind == "foot" for k in numbers for border in body.patch((scan, k)).borders[0])
+        if on_table or not below:
+            clues.append(Clue(-rotate(T, UP), T[:3, 3].copy(), CERTAIN_M, np.deg2rad(0.05), "support", 0.0, (scan, -1)))
+        clues += below
         for number in numbers:
             clues.append(_seen(body, (scan, number)))
             clues += _rims(body.patch((scan, number)), T, (scan, number))
-        clues += _stood_on(body, scan, numbers)
     return clues
 
 
@@ -114,8 +126,9 @@ def _stood_on(body: Body, scan: int, numbers: tuple[int, ...]) -> list[Clue]:
     clues = []
     for other in sorted(touched - set(numbers)):
         if patches[other].normal[2] > 1.0 - LEVEL**2:
-            below = _seen(body, (scan, other))
-            clues.append(below._replace(normal=-below.normal, kind="support", size=0.0))
+            below, up = _seen(body, (scan, other)), rotate(body.Ts_model_scan[scan], UP)
+            normal = up if below.normal @ up > np.cos(limit_of(below)) else below.normal
+            clues.append(below._replace(normal=-normal, kind="support", size=0.0))
     return clues
 
 
@@ -128,7 +141,7 @@ def _rims(patch: Patch, T: NDArray, of: tuple[int, int]) -> list[Clue]:
             if border.kind in ("rim", "cut", "image") and length > LEAST_SIDE_M:
                 outward = np.cross((end - start) / length, patch.normal)
                 kind = "rim" if border.kind == "rim" else "cut"
-                tilt = np.sqrt(12.0) * max(border.sigma, CERTAIN_M) / length
+                tilt = WANDER * np.sqrt(12.0) * max(border.sigma, CERTAIN_M) / length
                 clues.append(Clue(rotate(T, outward), apply(T, 0.5 * (start + end)), border.sigma, tilt, kind, length, of, (r, s)))
     return clues
 
@@ -178,20 +191,30 @@ def _off_square(normal: NDArray, axis: NDArray) -> float:
     return min(along, float(np.pi / 2) - along)
 
 
-def squared(clue: Clue, frame: NDArray) -> tuple[Clue, Squared | None]:
-    """The clue with its normal along an axis of the frame, or across one, where it is within its limit of that."""
+def squared(clue: Clue, frame: NDArray, ring: NDArray) -> tuple[Clue, Squared | None]:
+    """The clue with its normal along an axis of the frame, or across one, where it is within its limit of that.
+
+    A top that is a little out of level is taken at the highest corner of `ring` (n, 3): lids sag, and what is put on them meets that.
+    """
     limit = limit_of(clue)
     cosines = frame @ clue.normal
     nearest = int(np.argmax(np.abs(cosines)))
     off = float(np.arccos(np.clip(abs(cosines[nearest]), 0.0, 1.0)))
     if off <= limit:
-        return clue._replace(normal=np.sign(cosines[nearest]) * frame[nearest]), Squared(clue.of, "parallel", off, limit)
+        return _levelled(clue, np.sign(cosines[nearest]) * frame[nearest], ring), Squared(clue.of, "parallel", off, limit)
     across = int(np.argmin(np.abs(cosines)))
     off = float(np.arcsin(np.clip(abs(cosines[across]), 0.0, 1.0)))
     if off <= limit:
         normal = clue.normal - cosines[across] * frame[across]
-        return clue._replace(normal=normal / np.linalg.norm(normal)), Squared(clue.of, "right angle", off, limit)
+        return _levelled(clue, normal / np.linalg.norm(normal), ring), Squared(clue.of, "right angle", off, limit)
     return clue, None
+
+
+def _levelled(clue: Clue, normal: NDArray, ring: NDArray) -> Clue:
+    if clue.kind != "seen" or normal @ UP < 1.0 - LEVEL**2:
+        return clue._replace(normal=normal)
+    corners = ring - ((ring - clue.point) @ clue.normal)[:, None] * clue.normal
+    return clue._replace(normal=normal, point=corners[int(np.argmax(corners @ normal))])
 
 
 def planes_of_body(clues: Sequence[Clue]) -> tuple[BodyPlane, ...]:
@@ -224,4 +247,5 @@ def _plane_of(group: list[Clue]) -> BodyPlane:
     kind = min((clue.kind for clue in surest), key=("seen", "support", "rim").index)
     of = tuple(dict.fromkeys(clue.of for clue in faces))
     sides = tuple((*clue.of, *clue.side) for clue in group if clue.kind == "rim")
-    return BodyPlane(normal, offset, min(clue.sigma for clue in surest), kind, sum(clue.size for clue in group), of, sides)
+    middle = np.average([clue.point for clue in surest], axis=0, weights=weights)
+    return BodyPlane(normal, offset, middle, min(clue.sigma for clue in surest), kind, sum(clue.size for clue in group), of, sides)

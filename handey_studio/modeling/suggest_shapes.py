@@ -1,6 +1,7 @@
 """Closed solids that an object may be: cuboids, prisms on each face seen, and columns under all faces that look up."""
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import manifold3d
@@ -9,11 +10,14 @@ import shapely
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
-from handey_studio.geometry import Polyhedron, polyhedron_from_polygons, prism
+from handey_studio.geometry import Polyhedron, box, polyhedron_from_polygons, prism
 from handey_studio.geometry.transforms import apply, transform
 from handey_studio.modeling.suggest_planes import UP, Body, BodyPlane, Clue
 
 ALONG = np.cos(np.deg2rad(1.0))  # planes along an axis
+ROUGHLY_ALONG = np.cos(np.deg2rad(20.0))  # ragged rims, where nothing better is known
+OUTER_PART = 0.3  # of their length tells where they end
+NEAR_END_M = 0.02
 LEAST_THICK_M = 0.002
 SEEN_WORTH = 3.0  # a face that is seen tells three times as much as a rim of that length
 SHORT_SIGMAS, SHORT_PX_M = 3.0, 0.004  # shorter sides of an outline are the sensor's
@@ -44,7 +48,7 @@ class Line(NamedTuple):
 
 def shapes_of(body: Body, clues: Sequence[Clue], planes: Sequence[BodyPlane], frame: NDArray, short: float) -> Iterator[Shape]:
     """All candidates for an object; `short` [m]: outlines' sides below are the sensor's raggedness."""
-    yield cuboid(planes, frame)
+    yield from cuboids(clues, planes, frame)
     caps = [clue for clue in clues if clue.kind == "seen"]
     most = max((clue.size for clue in caps), default=0.0)
     for cap in caps:
@@ -55,23 +59,52 @@ def shapes_of(body: Body, clues: Sequence[Clue], planes: Sequence[BodyPlane], fr
         yield columns(body, upward, clues, planes, short)
 
 
-def cuboid(planes: Sequence[BodyPlane], frame: NDArray) -> Shape:
-    """The cuboid between the surest planes along the six directions of the frame."""
+def cuboids(clues: Sequence[Clue], planes: Sequence[BodyPlane], frame: NDArray) -> Iterator[Shape]:
+    """Cuboids between the surest planes along the six directions of the frame, down to each plane where the object may end below."""
     ends = []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            direction = sign * frame[axis]
-            along = [plane for plane in planes if plane.normal @ direction > ALONG and (plane.size > 0 or plane.kind == "support")]
-            if not along:
-                return Shape("cuboid", None, f"nothing shows where it ends along {_named(direction)}")
-            ends.append(max(along, key=_worth).offset)
-    size = np.array([ends[0] + ends[1], ends[2] + ends[3], ends[4] + ends[5]])
+    for direction in np.concatenate([frame, -frame]):
+        along = sorted((plane for plane in planes if plane.normal @ direction > ALONG), key=_worth, reverse=True)
+        found = [plane.offset for plane in along[: MOST_ENDS if direction @ UP < -ALONG else 1]]
+        found = found or _rough_end(clues, direction)
+        if not found:
+            yield Shape("cuboid", None, f"nothing shows where it ends along {_named(direction)}")
+            return
+        hidden = _hidden(clues, direction, found[0])
+        if hidden > 0 and not any(plane.kind != "rim" for plane in along):
+            yield Shape("cuboid", None, f"a nearer thing hides where it ends along {_named(direction)}", hidden, 0.0, "m")
+            return
+        ends.append(found)
+    for chosen in product(*ends):
+        yield _cuboid(np.array(chosen[:3]), np.array(chosen[3:]), frame)
+
+
+def _rough_end(clues: Sequence[Clue], direction: NDArray) -> list[float]:
+    """Where ragged rims that look roughly that way end: the mean of the outer part of them; empty if there are none."""
+    rims = [(float(c.point @ direction), c.size * float(c.normal @ direction)) for c in clues if c.kind == "rim" and c.side[0] == 0]
+    rims = sorted((offset, size) for offset, size in rims if size > 0)[::-1]
+    offsets, sizes = np.array(rims).reshape(-1, 2).T
+    roughly = [c for c in clues if c.kind == "rim" and c.normal @ direction > ROUGHLY_ALONG]
+    if not roughly:
+        return []
+    outer = np.cumsum(sizes) - sizes < OUTER_PART * sizes.sum()
+    return [float(np.average(offsets[outer], weights=sizes[outer]))]
+
+
+def _hidden(clues: Sequence[Clue], direction: NDArray, end: float) -> float:
+    """How much more [m] of the sides that look that way is cut off than ends, near the end or beyond."""
+    looking = [c for c in clues if c.normal @ direction > ROUGHLY_ALONG and c.point @ direction > end - NEAR_END_M]
+    lengths = {kind: sum(c.size for c in looking if c.kind == kind) for kind in ("cut", "rim")}
+    return lengths["cut"] - lengths["rim"]
+
+
+def _cuboid(high: NDArray, low: NDArray, frame: NDArray) -> Shape:
+    """The cuboid up to `high` (3,) along the frame's directions and to `low` (3,) against them [m]."""
+    size = high + low
+    option = "cuboid of " + " × ".join(f"{1e3 * length:.1f}" for length in size) + " mm"
     if size.min() < LEAST_THICK_M:
-        return Shape("cuboid", None, "it would be too thin", float(size.min()), LEAST_THICK_M, "m")
-    T = transform(frame.T, frame.T @ [0.5 * (ends[0] - ends[1]), 0.5 * (ends[2] - ends[3]), -ends[5]])
-    half = 0.5 * size[:2]
-    flat = prism([[-half[0], -half[1]], [half[0], -half[1]], [half[0], half[1]], [-half[0], half[1]]], size[2])
-    return Shape("cuboid", Polyhedron(apply(T, flat.vertices), flat.faces))
+        return Shape(option, None, "it would be too thin", float(size.min()), LEAST_THICK_M, "m")
+    solid = box(size)
+    return Shape(option, Polyhedron(apply(transform(frame.T, 0.5 * (high - low) @ frame), solid.vertices), solid.faces))
 
 
 def _worth(plane: BodyPlane) -> tuple[bool, float]:
