@@ -10,9 +10,9 @@ from handey_studio.base import Value, frozen_array
 
 @dataclass(frozen=True, eq=False)
 class Check(Value):
-    """One thing that a part must be. `name`: "closed", "planar", "outlines", "one body", "crossing", "thin", "sliver", "size", "volume", "mass",
-    "centre of mass". `sentence` tells what was found, `fix` what would help (empty when all is well).
+    """One thing that a part must be. `sentence` tells what was found, `fix` what would help (empty when all is well).
 
+    `name`: "closed", "planar", "outlines", "one body", "crossing", "thin", "sliver", "size", "volume", "mass" or "centre of mass".
     `faces` are the numbers of the faces that it is about, `where` (n, 3) [m] points in the model frame that show it.
     """
 

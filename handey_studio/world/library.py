@@ -70,6 +70,11 @@ class Library:
         """Name → model file."""
         return {path.stem: path for path in self._named("parts", lambda path: path.suffix.lower() in MESH_SUFFIXES).values()}
 
+    def drafts(self) -> dict[str, Path]:
+        """Name of a part → the draft that it was modelled by; only the one beside the model that is used."""
+        beside = {name: path.with_suffix(".draft") for name, path in self.part_files().items()}
+        return {name: path for name, path in beside.items() if path.is_file()}
+
     def sessions(self) -> dict[str, Path]:
         """Name → session file."""
         return {path.stem: path for path in self._named("sessions", lambda path: path.suffix == ".handey").values()}
