@@ -1,16 +1,19 @@
 """Which patches belong to one body: those that meet in convex edges, and others where nothing tells two bodies from one."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from handey_studio.modeling.patches import Crease
+from handey_studio.modeling.patches import Crease, Patch
 from handey_studio.sensing.depth_view import DepthView
 
 GAP_PX = 5  # readings of two patches so near in a row or column may be beside their crease
 NEAR_SIGMAS, NEAR_PX = 6.0, 3.0  # and so near in space, in deviations and pixels' sizes
 LEAST_READINGS = 5
+FULL_SIDE = 0.8  # of a patch's length: a rim along all of it
 LONG_CREASE = 8.0  # readings beside a crease by the root of the smaller patch's: patches of two bodies touch more shortly
 
 
@@ -43,11 +46,34 @@ def _is_convex(planes: NDArray, middles: NDArray, a: int, b: int) -> bool:
     return bool(behind > 0)
 
 
-def bodies_of(labels: NDArray, creases: tuple[Crease, ...], count: int) -> tuple[tuple[int, ...], ...]:
-    """Patch numbers of each body, that with most readings first."""
-    readings = np.bincount(labels[labels >= 0], minlength=count)
-    joined = [(c.a, c.b) for c in creases if c.convex and c.readings > LONG_CREASE * np.sqrt(min(readings[c.a], readings[c.b]))]
+def bodies_of(patches: Sequence[Patch], creases: Sequence[Crease], slack: float) -> tuple[tuple[int, ...], ...]:
+    """Patch numbers of each body, that with most readings first.
+
+    Patches that meet in a convex edge are one body's. A step, down over a rim or up a concave edge, is taken for one body's if both
+    faces end at the same places along it, within `slack` [m]: two bodies would hardly stand so flush.
+    """
+    joined = []
+    for crease in creases:
+        a, b = patches[crease.a], patches[crease.b]
+        long = crease.readings > LONG_CREASE * np.sqrt(min(a.readings, b.readings))
+        if long and (crease.convex or _flush(a, b, np.cross(a.normal, b.normal), slack)):
+            joined.append((a.number, b.number))
+    for upper in patches:
+        for start, end, border in zip(upper.rings[0], np.roll(upper.rings[0], -1, axis=0), upper.borders[0], strict=True):
+            if border.kind == "rim" and border.other >= 0 and _flush(upper, patches[border.other], end - start, slack, end - start):
+                joined.append((upper.number, border.other))
     rows, columns = np.array(joined, dtype=int).reshape(-1, 2).T
-    _, body = connected_components(coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)), directed=False)
+    links = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(patches), len(patches)))
+    body = connected_components(links, directed=False)[1]
     members = [tuple(int(k) for k in np.nonzero(body == number)[0]) for number in np.unique(body)]
-    return tuple(sorted(members, key=lambda group: -int(readings[list(group)].sum())))
+    return tuple(sorted(members, key=lambda group: -sum(patches[k].readings for k in group)))
+
+
+def _flush(a: Patch, b: Patch, direction: NDArray, slack: float, side: NDArray | None = None) -> bool:
+    """Whether two patches begin and end at the same places along a direction; a `side` must be as long as they are."""
+    length = float(np.linalg.norm(direction))
+    if length < 1e-9:
+        return False
+    one, other = (patch.rings[0] @ direction / length for patch in (a, b))
+    apart = max(abs(one.min() - other.min()), abs(one.max() - other.max()))
+    return bool(apart < slack and (side is None or length > FULL_SIDE * np.ptp(one)))

@@ -1,6 +1,6 @@
 """From a scan to its patches: regions of readings on one plane, their outlines, and which of them belong to one body."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,28 +119,26 @@ def _world_planes(view: DepthView, planes: NDArray, camera: Camera) -> NDArray:
 
 
 def _told(view: DepthView, labels: NDArray, planes: NDArray, sigma: NDArray, points: NDArray, creases: tuple[Crease, ...]) -> Patches:
-    """The patches with their outlines; regions without a simple outline stay labels that belong to no patch."""
+    """The patches with their outlines; regions without a simple outline stay readings that belong to no patch."""
     seen = Seen(view, labels, planes, sigma, lost_at_rims(view))
     outlines = [outlines_of(seen, k) for k in range(len(planes))]
     kept = [k for k, found in enumerate(outlines) if found]
-    number = np.full(len(planes), -1)
+    number = np.full(len(planes) + 2, -1)  # the last two for "none" and "support", -1 and -2
     number[kept] = np.arange(len(kept))
+    number[SUPPORT] = SUPPORT
+    labels = number[labels]
     creases = tuple(Crease(int(number[c.a]), int(number[c.b]), c.convex, c.readings) for c in creases if number[[c.a, c.b]].min() >= 0)
-    labels = np.where(labels >= 0, number[labels], labels)
-    objects = bodies_of(labels, creases, len(kept))
-    owner = {patch: k for k, members in enumerate(objects) for patch in members}
     patches = []
     for new, k in enumerate(kept):
+        rings = tuple(outline.ring for outline in outlines[k])
+        borders = tuple(tuple(Border(b.kind, int(number[b.other]), b.sigma) for b in outline.borders) for outline in outlines[k])
         on = points[labels == new]
-        rings = [outline.ring for outline in outlines[k]]
-        borders = tuple(
-            tuple(Border(b.kind, int(number[b.other]) if b.other >= 0 else b.other, b.sigma) for b in outline.borders)
-            for outline in outlines[k]
-        )
         rms, bend, tilt = _flatness(on, planes[k])
-        area = area_of(rings, planes[k, :3])
-        patches.append(Patch(new, planes[k, :3], float(planes[k, 3]), tuple(rings), borders, rms, area, len(on), bend, tilt, owner[new]))
-    return Patches(labels, tuple(patches), objects, creases)
+        area = area_of(list(rings), planes[k, :3])
+        patches.append(Patch(new, planes[k, :3], float(planes[k, 3]), rings, borders, rms, area, len(on), bend, tilt, 0))
+    objects = bodies_of(patches, creases, 3.0 * seen.lost_m)
+    owner = {patch: k for k, members in enumerate(objects) for patch in members}
+    return Patches(labels, tuple(replace(patch, object=owner[patch.number]) for patch in patches), objects, creases)
 
 
 def _flatness(points: NDArray, plane: NDArray) -> tuple[float, float, float]:
