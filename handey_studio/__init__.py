@@ -5,8 +5,8 @@ import handey_studio as hs
 library = hs.Library.choose()
 session = hs.read_session(hs.find_session(library, "figure1"))
 station, cell = hs.station_of(session, library), hs.cell_of(session, library)
-scene, result = hs.run_move(station, cell, session.commands[0])
-print(result.status, result.plan.certificate.least_clearance)
+result = hs.run_move(station, cell, session.commands[0]).result
+print(result.status, result.plan.certificate.least_clearance, result.check.sentence)
 """
 
 from importlib import import_module
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from handey_studio.sensing.support import support_plane
     from handey_studio.session import Session, find_session, new_session, read_session, write_session
     from handey_studio.session.run import cell_of, station_of
-    from handey_studio.task import MoveCommand, MoveOptions, MoveResult, Station, execute_in, plan_in, run_move, sense
+    from handey_studio.task import MoveCommand, MoveOptions, MoveResult, RecoveryOptions, Station, execute_in, plan_in, run_move, sense
     from handey_studio.world import Library, Part, PlacedPart, Robot, World, load_robot, read_part
 
 _HOMES = {
@@ -29,7 +29,7 @@ _HOMES = {
     "sensing.support": ("support_plane",),
     "session": ("Session", "find_session", "new_session", "read_session", "write_session"),
     "session.run": ("cell_of", "station_of"),
-    "task": ("MoveCommand", "MoveOptions", "MoveResult", "Station", "execute_in", "plan_in", "run_move", "sense"),
+    "task": ("MoveCommand", "MoveOptions", "MoveResult", "RecoveryOptions", "Station", "execute_in", "plan_in", "run_move", "sense"),
     "world": ("Library", "Part", "PlacedPart", "Robot", "World", "load_robot", "read_part"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
@@ -53,6 +53,7 @@ __all__ = [
     "Part",
     "PlacedPart",
     "Progress",
+    "RecoveryOptions",
     "Robot",
     "Session",
     "Station",

@@ -1,12 +1,13 @@
 """`handey move`: run a session's MOVEs."""
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handey_studio.base import BadInput, Entry, describe
-from handey_studio.commands.arguments import DONE, FAILED, Lines, check_output, write_json
+from handey_studio.commands.arguments import DONE, FAILED, Lines, check_output, positive, write_json
 from handey_studio.world import Library
 
 if TYPE_CHECKING:
@@ -18,6 +19,16 @@ HELP = "run a session's MOVEs: sense, plan, execute"
 
 
 def add_arguments(move: argparse.ArgumentParser) -> None:
+    add_common(move)
+    move.add_argument("--resume", action="store_true", help="go on where the saved session stopped: what is done is not done again")
+    move.add_argument("--step", action="store_true", help="only the next command")
+    move.add_argument("--go-on", action="store_true", help="take the next command after one that failed")
+    move.add_argument("--attempts", type=positive, default=3, help="how often a MOVE is tried, the first time among them (default: 3)")
+    move.add_argument("--recordings", action="store_true", help="what was measured goes into the JSON too")
+
+
+def add_common(move: argparse.ArgumentParser) -> None:
+    """What `move` and `plan` share."""
     move.add_argument("session", help="a session file, or its name in a library")
     move.add_argument("--part", help="move this part instead of running the session's own commands")
     move.add_argument("--to", metavar="DESTINATION", help="x,y,z[,roll,pitch,yaw] (metres, degrees), on:PART[:POSE] or in:x0,y0,x1,y1")
@@ -28,14 +39,39 @@ def add_arguments(move: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    return run_moves(given, execute=True)
+    from handey_studio.session.sequence import from_the_start, run_list, states_of
+    from handey_studio.task import RecoveryOptions
+
+    session, library = opened(given)
+    if not given.resume:
+        session = from_the_start(session)
+    earlier, watching = len(session.results), Watching()
+    recovery = RecoveryOptions(attempts=given.attempts)
+    session = run_list(session, library, watching, 1 if given.step else None, given.go_on, recovery)
+    states = states_of(session)
+    for number, (command, state) in enumerate(zip(session.commands, states, strict=True), 1):
+        if len(states) > 1:
+            print(f"{number:3d} {state.status:8} MOVE {command.part} TO {command.to}")
+    write_outputs(given, session, library, session.results[earlier:])
+    return DONE if all(state.status in ("done", "skipped") for state in states) else FAILED
 
 
-def run_moves(given: argparse.Namespace, execute: bool) -> int:
-    from handey_studio.session import find_session, read_session, write_session
-    from handey_studio.session.run import cell_of, station_of
-    from handey_studio.task import MoveOptions, run_move
-    from handey_studio.task.report import move_report
+class Watching(Lines):
+    """Tells each result as it comes."""
+
+    def __init__(self) -> None:
+        self._told = 0
+
+    def show(self, session: "Session") -> None:
+        for result in session.results[max(self._told, 0) :]:
+            if result.status != "planned":
+                tell(result)
+        self._told = len(session.results)
+
+
+def opened(given: argparse.Namespace) -> "tuple[Session, Library]":
+    """The session that is asked for, with the commands, robot and seed that are given."""
+    from handey_studio.session import find_session, read_session
 
     for output in (given.json, given.save):
         check_output(output)
@@ -43,22 +79,20 @@ def run_moves(given: argparse.Namespace, execute: bool) -> int:
     session = read_session(find_session(library, given.session))
     if given.robot is not None:
         session = replace(session, workcell=replace(session.workcell, robot=given.robot))
-    commands = _commands(given, session)
     seed = session.seed if given.seed is None else given.seed
-    station, cell = station_of(session, library), cell_of(session, library)
-    results, scene = [], None
-    for command in commands:
-        scene, result = run_move(station, cell, command, MoveOptions(seed=seed), execute, Lines())
-        results.append(result)
-        _tell(result)
-        if result.status == "failed":
-            break
+    return replace(session, commands=_commands(given, session), seed=seed), library
+
+
+def write_outputs(given: argparse.Namespace, session: "Session", library: Library, results: "Sequence[MoveResult]") -> None:
+    """The JSON and the session, where they are asked for."""
+    from handey_studio.session import write_session
+    from handey_studio.task.report import move_report
+
     if given.json:
-        write_json(given.json, move_report(results, station.robot))
+        robot = library.robot(session.workcell.robot)
+        write_json(given.json, move_report(list(results), robot, getattr(given, "recordings", False)))
     if given.save:
-        now = cell.setup_now() if execute else session.cell_now
-        write_session(given.save, replace(session, commands=commands, seed=seed, scene=scene, results=tuple(results), cell_now=now))
-    return DONE if len(results) == len(commands) and all(result.status != "failed" for result in results) else FAILED
+        write_session(given.save, session)
 
 
 def _commands(given: argparse.Namespace, session: "Session") -> "tuple[MoveCommand, ...]":
@@ -73,10 +107,16 @@ def _commands(given: argparse.Namespace, session: "Session") -> "tuple[MoveComma
     return session.commands
 
 
-def _tell(result: "MoveResult") -> None:
+def tell(result: "MoveResult") -> None:
+    """A result on standard output."""
     stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in result.timing_s.items())
     print(f"MOVE {result.command.part} TO {result.command.to}: {result.status}{': ' + result.reason if result.reason else ''}")
     print(f"  {stages}")
+    for number, attempt in enumerate(result.attempts, 1):
+        recovery = attempt.recovery
+        print(f"  attempt {number}: {recovery.incident}; {'; '.join((*recovery.actions, recovery.why))}")
+    if result.check is not None:
+        print(f"  check: {result.check.sentence}")
     if result.plan is not None:
         certificate = result.plan.certificate
         clearance = f"{1e3 * certificate.least_clearance:.1f} mm ({' and '.join(certificate.bodies)})"

@@ -1,14 +1,30 @@
 """`handey plan`: MOVEs that stop before executing."""
 
 import argparse
+from dataclasses import replace
 
-from handey_studio.commands import move
+from handey_studio.commands.arguments import DONE, FAILED, Lines
+from handey_studio.commands.move import add_common, opened, tell, write_outputs
 
 NAME = "plan"
 HELP = "sense and plan a session's MOVEs, execute nothing"
 
-add_arguments = move.add_arguments
+add_arguments = add_common
 
 
 def run(given: argparse.Namespace) -> int:
-    return move.run_moves(given, execute=False)
+    from handey_studio.session.run import cell_of, station_of
+    from handey_studio.task import MoveOptions, run_move
+
+    session, library = opened(given)
+    station, cell = station_of(session, library), cell_of(session, library)
+    results = []
+    for command in session.commands:
+        outcome = run_move(station, cell, command, MoveOptions(seed=session.seed), False, Lines())
+        session = replace(session, scene=outcome.scene, results=(*results, outcome.result), states=())
+        results.append(outcome.result)
+        tell(outcome.result)
+        if outcome.result.status == "failed":
+            break
+    write_outputs(given, session, library, results)
+    return DONE if len(results) == len(session.commands) and all(result.status != "failed" for result in results) else FAILED

@@ -62,17 +62,13 @@ def _check_counts(session: Session) -> None:
         ("located parts", len(session.located), MAX_PARTS),
         ("commands", len(session.commands), MAX_COMMANDS),
         ("results", len(session.results), MAX_RESULTS),
+        ("states of commands", len(session.states), MAX_COMMANDS),
         ("bodies", len(session.workcell.setup.bodies), MAX_BODIES),
         ("blocks", len(session.workcell.blocks), MAX_BODIES),
     )
     for thing, count, limit in counts:
         if count > limit:
             raise BadInput(f"the session has {count} {thing}, the limit is {limit}.")
-    if session.states and len(session.states) != len(session.commands):
-        raise BadInput(f"the session has {len(session.states)} states for {len(session.commands)} commands; it needs one each, or none.")
-    for state in session.states:
-        if not -1 <= state.result < len(session.results):
-            raise BadInput(f"a command's state names result {state.result}; there are {len(session.results)}.")
     missing = sorted(set(session.workcell.parts) - {part.name for part in session.parts})
     if missing:
         raise BadInput(f"the session lacks the model of {', '.join(missing)}.")

@@ -7,10 +7,10 @@ from handey_studio.base import BadInput, Progress, Share
 from handey_studio.cell.protocol import CannotAct
 from handey_studio.cell.simulated import SimulatedCell, simulated_cell
 from handey_studio.session.session import Session
-from handey_studio.task import MoveOptions, MoveResult, Station, check_command, execute_in, plan_in, sense
+from handey_studio.task import MoveOptions, MoveResult, Order, RecoveryOptions, Station, carry_out, check_command, plan_in, sense
 from handey_studio.world import Library
 
-SENSED, PLANNED = 0.25, 0.9  # how much of a whole MOVE's progress is behind when it is sensed, and when it is planned
+SENSED, PLANNED = 0.25, 0.6  # how much of a whole MOVE's progress is behind when it is sensed, and when it is planned
 
 
 class ShowingProgress(Progress, Protocol):
@@ -19,7 +19,9 @@ class ShowingProgress(Progress, Protocol):
     def show(self, session: Session) -> None: ...
 
 
-def run_session(session: Session, library: Library, execute: bool, progress: ShowingProgress) -> Session:
+def run_session(
+    session: Session, library: Library, execute: bool, progress: ShowingProgress, recovery: RecoveryOptions = RecoveryOptions()
+) -> Session:
     """Sense, plan and, if asked, execute the session's last MOVE in its cell; the session with all that was found.
 
     A plan that was made for this MOVE and looked at is carried out as it is. Nothing found is a result in the session, not an
@@ -36,7 +38,7 @@ def run_session(session: Session, library: Library, execute: bool, progress: Sho
             progress.show(session)
     if not execute or not is_planned(session) or progress.cancelled:
         return session
-    return _executed(session, station, cell, progress)
+    return _executed(session, station, cell, recovery, progress)
 
 
 def is_planned(session: Session) -> bool:
@@ -58,11 +60,14 @@ def _sensed_and_planned(session: Session, station: Station, cell: SimulatedCell,
     return replace(session, results=(result,))
 
 
-def _executed(session: Session, station: Station, cell: SimulatedCell, progress: ShowingProgress) -> Session:
+def _executed(session: Session, station: Station, cell: SimulatedCell, recovery: RecoveryOptions, progress: ShowingProgress) -> Session:
+    """The scene of a session is the one that its plan was made in: a recovery may have made a new one."""
     if session.scene is None:
         return session
-    result = execute_in(station, session.scene, session.results[-1], cell, Share(progress, PLANNED, 1.0))
-    return replace(session, results=(result,), cell_now=cell.setup_now())
+    planned = session.results[-1]
+    order = Order(station, planned.command, MoveOptions(seed=session.seed), recovery)
+    outcome = carry_out(order, session.scene, planned, cell, Share(progress, PLANNED, 1.0))
+    return replace(session, scene=outcome.scene, results=(outcome.result,), cell_now=cell.setup_now())
 
 
 def station_of(session: Session, library: Library) -> Station:

@@ -2,11 +2,14 @@
 
 from handey_studio.task.carrying import Start
 from handey_studio.task.destination import format_pose, goal_poses, parse_destination
+from handey_studio.task.execution import Order, Outcome, carry_out
 from handey_studio.task.move import MoveOptions, check_command, plan_move
 from handey_studio.task.performance import Check, Incident, Performance, Performed, Recovery
 from handey_studio.task.plan import Attempt, GraspChoice, MoveCommand, MovePlan, MoveResult, Step
+from handey_studio.task.planning import Station, plan_in, sense, understood
+from handey_studio.task.recover import RecoveryOptions
 from handey_studio.task.ruled_out import RuledOut
-from handey_studio.task.run import Station, execute_in, plan_in, run_move, sense
+from handey_studio.task.run import execute_in, run_move
 from handey_studio.task.search import SearchOptions
 from handey_studio.task.sense import Scene, believed_world
 
@@ -19,9 +22,12 @@ __all__ = [
     "MoveOptions",
     "MovePlan",
     "MoveResult",
+    "Order",
+    "Outcome",
     "Performance",
     "Performed",
     "Recovery",
+    "RecoveryOptions",
     "RuledOut",
     "Scene",
     "SearchOptions",
@@ -29,6 +35,7 @@ __all__ = [
     "Station",
     "Step",
     "believed_world",
+    "carry_out",
     "check_command",
     "execute_in",
     "format_pose",
@@ -38,4 +45,5 @@ __all__ = [
     "plan_move",
     "run_move",
     "sense",
+    "understood",
 ]

@@ -18,7 +18,9 @@ from handey_studio.cell.solvable import solvable_move
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.task.move import MoveOptions
 from handey_studio.task.plan import MoveCommand, MovePlan
-from handey_studio.task.run import Station, run_move
+from handey_studio.task.planning import Station
+from handey_studio.task.recover import RecoveryOptions
+from handey_studio.task.run import run_move
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, PlacedPart, Robot
 
@@ -65,7 +67,9 @@ def _row(seed: int, pile: Pile, library: Library) -> dict[str, Any]:
     cell = simulated_cell(pile.workcell, library)
     before = cell.true_scene()
     begun = time.perf_counter()
-    scene, result = run_move(station, cell, MoveCommand(pile.part, pile.to), MoveOptions(seed=seed))
+    once = RecoveryOptions(attempts=1, look_again=False)  # the first plan is what is judged
+    outcome = run_move(station, cell, MoveCommand(pile.part, pile.to), MoveOptions(seed=seed), recovery=once)
+    scene, result = outcome.scene, outcome.result
     total = time.perf_counter() - begun
     off = _off(pile, station, cell) if result.status == "done" else (None, None)
     wrong = judge(scene, result.plan, before, robot) if scene is not None and result.plan is not None else None

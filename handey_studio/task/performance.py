@@ -25,6 +25,7 @@ IncidentKind = Literal[
     "late contact",  # the descent met nothing at the destination
     "hand stuck",  # the fingers do not go where they are sent
     "refused",  # the cell would not do it
+    "stopped",  # somebody stopped it
 ]
 
 
@@ -32,7 +33,8 @@ IncidentKind = Literal[
 class Incident:
     """Something that went otherwise than planned, noticed at plan step `step`: -1 before the first, the number of steps after the last.
 
-    `value` is what was measured and `limit` what it was held against, in `unit` as in the ledger; `sentence` tells it to a person.
+    `value` is what was measured and `limit` what it was held against, in `unit` as in the ledger; `sentence` tells it to a person. One
+    that was `overcome` on the spot did not end the attempt.
     """
 
     kind: IncidentKind
@@ -41,6 +43,7 @@ class Incident:
     value: float | None = None
     limit: float | None = None
     unit: str = ""
+    overcome: bool = False
 
     def __str__(self) -> str:
         number = "" if self.value is None else f": {measured(self.value, self.unit)}"
@@ -67,10 +70,13 @@ class Performed(Value):
 class Check(Value):
     """What the scan after the release tells of the part.
 
-    `T_world_part` (4, 4) where it was seen, in the naming of its symmetry that is nearest to the command, `off_m` and `off_rad` from there;
-    None where it was not seen, and `sentence` tells what else was measured. `rivals`: what the view cannot tell it from.
+    `found`: it was located near its place (`seen`); not recognised, but the readings at its place are as of it (`agrees`); nobody can
+    see its place (`hidden`); or its place is empty or taken by something else (`not there`). `T_world_part` (4, 4) where it was seen, in
+    the naming of its symmetry that is nearest to the command, `off_m` and `off_rad` from there; None where it was not, and `sentence` tells
+    what else was measured. `rivals`: what the view cannot tell it from.
     """
 
+    found: Literal["seen", "agrees", "hidden", "not there"]
     sentence: str
     T_world_part: NDArray | None = None
     off_m: float | None = None

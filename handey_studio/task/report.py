@@ -7,13 +7,15 @@ import numpy as np
 from handey_studio.base import entry_report, finite, rejected_counts
 from handey_studio.grasping import Grip
 from handey_studio.motion.answer import certificate_report
+from handey_studio.task.performance_report import performance_report
 from handey_studio.task.plan import Carry, GraspChoice, MoveResult, Step
 from handey_studio.world import Robot
 
 
-def move_report(results: list[MoveResult], robot: Robot) -> dict[str, Any]:
-    """All MOVEs of one run."""
-    return {"schema": "handey/move/1", "robot": robot.name, "moves": [_move(result, robot) for result in results]}
+def move_report(results: list[MoveResult], robot: Robot, recordings: bool = False) -> dict[str, Any]:
+    """All MOVEs of one run; with `recordings` also what was measured while they were carried out."""
+    moves = [_move(result, robot) | performance_report(result, recordings) for result in results]
+    return {"schema": "handey/move/1", "robot": robot.name, "moves": moves}
 
 
 def _move(result: MoveResult, robot: Robot) -> dict[str, Any]:

@@ -1,0 +1,115 @@
+"""The way back after an incident: with the part to where it was taken up, then with an empty hand to where the plan began.
+
+The way that the arm came by was free, so it goes back the same way; only from where it let the part fall it looks for a new one.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.base import Progress, Silent
+from handey_studio.cell.protocol import CannotAct
+from handey_studio.motion import PathOptions, Trajectory, plan_path, time_path
+from handey_studio.task.acting import WAY_BACK, fingers_only
+from handey_studio.task.noticing import not_arrived
+from handey_studio.task.perform import GUARDED_SLOWER, Performer
+from handey_studio.task.performance import Incident
+from handey_studio.task.plan import Step
+from handey_studio.world import World
+
+
+@dataclass(frozen=True)
+class CameBack:
+    """What was done, in words, and what stopped it, None when the arm is back with an empty hand."""
+
+    actions: tuple[str, ...] = ()
+    stopped: Incident | None = None
+
+
+def come_back(performer: Performer, step: int, world: World, progress: Progress = Silent()) -> CameBack:
+    """From where a performance ended in `step`. `world` is what the planner believes, in which a new way is looked for."""
+    actions: list[str] = []
+    try:
+        stopped = _put_back(performer, step, actions) if performer.holding else _emptied(performer, step, actions)
+        if stopped is None:
+            stopped = _home(performer, step, world, actions, progress)
+    except CannotAct as error:
+        stopped = Incident("refused", WAY_BACK, str(error))
+    return CameBack(tuple(actions), stopped)
+
+
+def _put_back(performer: Performer, step: int, actions: list[str]) -> Incident | None:
+    """The part goes back the way it came, is set down where it was taken up, and let go."""
+    steps, carry = performer.task.plan.steps, performer.task.plan.carry_at(step)
+    if steps[step].kind == "open":
+        return Incident("hand stuck", WAY_BACK, "the fingers do not let go of the part; the arm stays where it is")
+    taken = next(k for k in range(step, -1, -1) if steps[k].kind == "close")
+    for k in range(step, taken, -1):
+        motion = _reversed(steps[k], performer.cell.joints())
+        if steps[k].kind == "lift":
+            slow = replace(motion, time_s=motion.time_s * GUARDED_SLOWER)
+            moved = performer.acting.descend(WAY_BACK, "put back", slow)
+        else:
+            moved = performer.acting.follow(WAY_BACK, f"{steps[k].kind}, backwards", motion)
+        stopped = not_arrived(moved, steps[k].q_rad[0], WAY_BACK, f"{steps[k].kind}, backwards")
+        if stopped is not None:
+            return stopped
+    actions.append("the part is put back where it was taken up")
+    stopped = performer.let_go(WAY_BACK, carry.grasp.opening)
+    performer.holding = stopped is not None
+    return stopped or _back_along(performer, taken - 1, actions)
+
+
+def _emptied(performer: Performer, step: int, actions: list[str]) -> Incident | None:
+    """An empty hand opens, and where nothing was taken up yet the arm goes back the way it came."""
+    steps, carry = performer.task.plan.steps, performer.task.plan.carry_at(step)
+    if performer.cell.opening() < carry.grasp.opening and any(one.kind == "close" for one in steps[carry.first_step : step + 1]):
+        stopped = performer.let_go(WAY_BACK, carry.grasp.opening)
+        if stopped is not None:
+            return stopped
+        actions.append("the hand opens")
+    if all(one.held is None for one in steps[carry.first_step : step + 1]):
+        return _back_along(performer, step, actions)
+    return None
+
+
+def _back_along(performer: Performer, step: int, actions: list[str]) -> Incident | None:
+    """Steps of an empty hand backwards, from `step` to the first of its carry."""
+    steps, carry = performer.task.plan.steps, performer.task.plan.carry_at(step)
+    for k in range(step, carry.first_step - 1, -1):
+        if fingers_only(steps[k]):
+            continue
+        motion = _reversed(steps[k], performer.cell.joints())
+        motion = replace(motion, hand_opening_m=np.full(len(motion.time_s), performer.cell.opening()))
+        moved = performer.acting.follow(WAY_BACK, f"{steps[k].kind}, backwards", motion)
+        stopped = not_arrived(moved, steps[k].q_rad[0], WAY_BACK, f"{steps[k].kind}, backwards")
+        if stopped is not None:
+            return stopped
+    actions.append("the arm goes back the way it came")
+    return None
+
+
+def _home(performer: Performer, step: int, world: World, actions: list[str], progress: Progress) -> Incident | None:
+    """To where the plan began, if the way back did not end there."""
+    acting, start = performer.acting, performer.task.plan.steps[0].q_rad[0]
+    q = performer.cell.joints()
+    if np.abs(q - start).max() < 1e-3:
+        return None
+    ended = performer.task.plan.steps[step]
+    if ended.kind == "free" and np.abs(q - ended.q_rad[-1]).max() > 1e-3:
+        acting.follow(WAY_BACK, "free, backwards", _reversed(ended, q))
+        q = performer.cell.joints()
+    opening = performer.cell.opening()
+    path = plan_path(world, q, start, opening, options=PathOptions(), rng=np.random.default_rng(0), progress=progress)
+    if not path.found:
+        return Incident("blocked", WAY_BACK, f"no way home is known: {path.reason}")
+    moved = acting.follow(WAY_BACK, "home", time_path(world.robot, path, opening))
+    actions.append("the arm goes home another way")
+    return not_arrived(moved, start, WAY_BACK, "home")
+
+
+def _reversed(step: Step, q: NDArray) -> Trajectory:
+    """A step backwards from the sample that is nearest to where the arm is."""
+    k = int(np.argmin(np.abs(step.q_rad - q).max(axis=1))) + 1
+    return Trajectory(step.time_s[k - 1] - step.time_s[:k][::-1], step.q_rad[:k][::-1], step.hand_opening_m[:k][::-1])
