@@ -15,7 +15,7 @@ from handey_studio.geometry.transforms import apply, rotate
 from handey_studio.modeling.patches import Patch, Patches
 
 SQUARE_SIGMAS = 3.0  # a direction that is off by so many of its tilts may be square
-LEAST_SQUARE_RAD, MOST_SQUARE_RAD = np.deg2rad(0.4), np.deg2rad(7.0)
+LEAST_SQUARE_RAD, MOST_SQUARE_RAD = np.deg2rad(0.4), np.deg2rad(9.0)
 SAME_SIGMAS, LEAST_SAME_M = 3.0, 0.0004  # offsets of one plane
 SAME_RAD = np.deg2rad(3.0)  # normals of one plane, where they are not square
 LEVEL = 0.2  # sine of a face's slope: less is level

@@ -19,10 +19,13 @@ ROUGHLY_ALONG = np.cos(np.deg2rad(20.0))  # ragged rims, where nothing better is
 OUTER_PART = 0.3  # of their length tells where they end
 NEAR_END_M = 0.02
 LEAST_THICK_M = 0.002
+LEAST_SLOPE = 0.1  # sine of the angle between planes whose meeting is a side
 SEEN_WORTH = 3.0  # a face that is seen tells three times as much as a rim of that length
 SHORT_SIGMAS, SHORT_PX_M = 3.0, 0.004  # shorter sides of an outline are the sensor's
 INTO_M = 0.001  # columns reach into higher ones beside them
+NEAR_STEP_M = 0.006  # so near to where a higher face hides the lower one its side goes down
 MOST_ENDS = 3
+EXACT_DIGITS = 7  # a ten thousandth of a millimetre
 
 
 class Shape(NamedTuple):
@@ -53,10 +56,10 @@ def shapes_of(body: Body, clues: Sequence[Clue], planes: Sequence[BodyPlane], fr
     most = max((clue.size for clue in caps), default=0.0)
     for cap in caps:
         if cap.size > 0.25 * most:
-            yield from prisms(body, cap, clues, planes, short)
+            yield from prisms(body, cap, planes, short)
     upward = [cap for cap in caps if cap.normal @ UP > 0.2]
     if upward and (len(upward) > 1 or upward[0].normal @ UP < ALONG):
-        yield columns(body, upward, clues, planes, short)
+        yield columns(body, upward, planes, _upright(frame), short)
 
 
 def cuboids(clues: Sequence[Clue], planes: Sequence[BodyPlane], frame: NDArray) -> Iterator[Shape]:
@@ -118,7 +121,7 @@ def _named(direction: NDArray) -> str:
     return "(" + ", ".join(f"{value + 0.0:.2f}" for value in direction) + ")"
 
 
-def prisms(body: Body, cap: Clue, clues: Sequence[Clue], planes: Sequence[BodyPlane], short: float) -> Iterator[Shape]:
+def prisms(body: Body, cap: Clue, planes: Sequence[BodyPlane], short: float) -> Iterator[Shape]:
     """A seen face extruded back to each plane where the object may end."""
     option = f"face {cap.of[1] + 1} of scan {cap.of[0] + 1}"
     top = _plane_with(planes, cap.of)
@@ -163,7 +166,7 @@ def _plane_with(planes: Sequence[BodyPlane], of: tuple[int, int]) -> BodyPlane:
 def _lines(body: Body, cap: Clue, ring: int, planes: Sequence[BodyPlane], basis: NDArray) -> list[Line]:
     """The sides of one ring of a cap's outline in its plane; where the object has a plane for a side, on that plane."""
     patch, T = body.patch(cap.of), body.Ts_model_scan[cap.of[0]]
-    corners = apply(T, patch.rings[ring]) @ basis
+    corners, level = apply(T, patch.rings[ring]) @ basis, _plane_with(planes, cap.of).offset
     out = []
     for s, border in enumerate(patch.borders[ring]):
         start, end = corners[s, :2], corners[(s + 1) % len(corners), :2]
@@ -173,12 +176,20 @@ def _lines(body: Body, cap: Clue, ring: int, planes: Sequence[BodyPlane], basis:
         outward = np.array([end[1] - start[1], start[0] - end[0]]) / length
         offset = float(outward @ (0.5 * (start + end)))
         plane = _plane_of_side(body, cap, ring, s, planes)
-        if plane is not None and abs(plane.normal @ basis[:, 2]) < 0.02:
-            flat = plane.normal @ basis[:, :2]
-            if flat @ outward > 0.9:
-                outward, offset = flat / np.linalg.norm(flat), plane.offset / float(np.linalg.norm(flat))
+        if plane is not None:
+            outward, offset = _on_plane(plane, basis, level, outward, offset)
         out.append(Line(outward, offset, length, border.sigma, border.kind in ("cut", "image")))
     return out
+
+
+def _on_plane(plane: BodyPlane, basis: NDArray, level: float, outward: NDArray, offset: float) -> tuple[NDArray, float]:
+    """The side where a plane meets the cap at `level` [m] along its normal, whichever way it looks; as it was if they hardly meet there."""
+    flat = plane.normal @ basis[:, :2]
+    size = float(np.linalg.norm(flat))
+    if size < LEAST_SLOPE or abs(flat @ outward) < 0.9 * size:
+        return outward, offset
+    sign = 1.0 if flat @ outward > 0 else -1.0
+    return sign * flat / size, sign * (plane.offset - float(plane.normal @ basis[:, 2]) * level) / size
 
 
 def _plane_of_side(body: Body, cap: Clue, ring: int, side: int, planes: Sequence[BodyPlane]) -> BodyPlane | None:
@@ -258,8 +269,9 @@ def _solid_of(made: manifold3d.Manifold) -> Polyhedron:
     return polyhedron_from_polygons(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).tolist())
 
 
-def columns(body: Body, upward: Sequence[Clue], clues: Sequence[Clue], planes: Sequence[BodyPlane], short: float) -> Shape:
-    """All that stands below the faces that look up, down to the support."""
+def columns(body: Body, upward: Sequence[Clue], planes: Sequence[BodyPlane], upright: NDArray, short: float) -> Shape:
+    """All that stands below the faces that look up, down to the support. `upright` (3, 3): rows are directions in which sides are made
+    exact, so that those on one plane become one face, the third up."""
     option = f"columns under {len(upward)} faces"
     made = manifold3d.Manifold()
     for cap in upward:
@@ -271,30 +283,44 @@ def columns(body: Body, upward: Sequence[Clue], clues: Sequence[Clue], planes: S
         polygon = _polygon([lines])
         if polygon is None:
             return Shape(option, None, f"the outline of face {cap.of[1] + 1} has no simple polygon")
-        made = made + _column(polygon, cap, _plane_with(planes, cap.of))
+        made = made + _column(polygon, cap, _plane_with(planes, cap.of), upright)
     try:
-        return Shape(option, _solid_of(made))
+        solid = _solid_of(made)
     except BadInput as error:
         return Shape(option, None, str(error).rstrip("."))
+    return Shape(option, Polyhedron(solid.vertices @ upright, solid.faces))
+
+
+def _upright(frame: NDArray) -> NDArray:
+    """The frame's level directions and up, as rows; those of the world where it is tilted."""
+    if abs(frame[2] @ UP) < ALONG:
+        return np.eye(3)
+    return np.stack([frame[0], np.cross(UP, frame[0]), UP])
 
 
 def _stepped(body: Body, cap: Clue, lines: list[Line], planes: Sequence[BodyPlane]) -> list[Line]:
-    """Sides where a higher face of the same object hides nothing more than a step: they reach a little into that."""
-    borders = body.patch(cap.of).borders[0]
+    """Sides where a higher face of the same object hides nothing more than a step: they reach a little into what is below that."""
+    basis, level = _basis(cap.normal), _plane_with(planes, cap.of).offset
+    rising = {c.a + c.b - cap.of[1] for c in body.patches[cap.of[0]].creases if cap.of[1] in (c.a, c.b) and not c.convex}
     own = {patch for scan, patches in body.members if scan == cap.of[0] for patch in patches}
     out = []
-    for line, border in zip(lines, borders, strict=False):
-        inside = border.other in own and (line.cut or border.kind == "crease")
-        out.append(line._replace(offset=line.offset + INTO_M, cut=False) if inside else line)
+    for line, border in zip(lines, body.patch(cap.of).borders[0], strict=False):
+        if border.other in own and (border.kind == "cut" or (border.kind == "crease" and border.other in rising)):
+            facing = [p for p in planes if p.normal @ basis[:, :2] @ line.outward < -0.97 and abs(p.offset + line.offset) < NEAR_STEP_M]
+            outward, offset = line.outward, line.offset
+            if facing:
+                nearest = min(facing, key=lambda p: abs(p.offset + line.offset))
+                outward, offset = _on_plane(nearest, basis, level, outward, offset)
+            line = line._replace(outward=outward, offset=offset + INTO_M, cut=False)
+        out.append(line)
     return out
 
 
-def _column(polygon: shapely.Polygon, cap: Clue, top: BodyPlane) -> manifold3d.Manifold:
-    """What lies straight below a polygon of the cap's plane, down to z = 0."""
+def _column(polygon: shapely.Polygon, cap: Clue, top: BodyPlane, upright: NDArray) -> manifold3d.Manifold:
+    """What lies straight below a polygon of the cap's plane, down to z = 0, in the directions `upright`."""
     basis = _basis(cap.normal)
     corners = np.asarray(polygon.exterior.coords)[:-1]
-    points = np.c_[corners, np.full(len(corners), top.offset)] @ basis.T
-    flat = np.array(points[:, :2])
+    points = np.round(np.c_[corners, np.full(len(corners), top.offset)] @ basis.T @ upright.T, EXACT_DIGITS)
     high = float(points[:, 2].max()) + 1.0
-    block = manifold3d.Manifold.extrude(manifold3d.CrossSection([flat]), high)
-    return block.trim_by_plane(tuple(-cap.normal), -top.offset)
+    block = manifold3d.Manifold.extrude(manifold3d.CrossSection([points[:, :2].copy()]), high)
+    return block.trim_by_plane(tuple(-upright @ cap.normal), -top.offset)
