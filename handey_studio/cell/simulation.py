@@ -19,6 +19,7 @@ FINGER_RATE = 60.0  # rad/s of the fingers' drive
 FINGER_INTEGRAL = 4e5  # N/(m s): how fast the drive leans on what stops it, up to its force
 GRIP_STIFF = (0.99, 0.999, 0.0005, 0.5, 2.0)  # impedance of the pads: a held part may not creep out of them
 JAM = 1e5  # friction [N m, N] of what is jammed
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 NOWHERE = np.array([0.0, 0.0, -50.0])  # where bodies wait that are not there yet
 
 
@@ -38,6 +39,7 @@ class Simulation:
         self.finger_dofs = np.array([self.model.joint(name).dofadr[0] for name in FINGERS])
         self._site = self.model.site("hand").id
         self._hand_bodies = np.array([self.model.body(name).id for name in ("hand", *FINGERS)])
+        self._is_pad = np.isin(np.arange(self.model.nbody), self._hand_bodies[1:])
         self._base = self.model.body("link0").id
         limits = np.array(arm.model.effortLimit, dtype=float)
         self._effort = np.where((limits > 0) & np.isfinite(limits), limits, np.inf)
@@ -46,6 +48,7 @@ class Simulation:
         self._integral = 0.0
         self.finger_force = 0.0
         """What each finger's drive closes with now [N]."""
+        self._moves, self._turns = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         self._wanted, self._torque = np.zeros(self.model.nv), np.zeros(self.model.nv)
         self._there: set[int] = set()
         for number in range(len(self._ghosts)):
@@ -66,6 +69,7 @@ class Simulation:
         """
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
+        self._turn_with_hand()
         dofs = self.arm_dofs
         error = to.q - to.velocity * self.dt - data.qpos[self._q_at]
         behind = to.velocity - to.acceleration * self.dt - data.qvel[dofs]
@@ -76,13 +80,40 @@ class Simulation:
         data.qfrc_applied[self.finger_dofs] = self._finger_push(fingers) + data.qfrc_bias[self.finger_dofs]
         mujoco.mj_step2(model, data)
 
+    def _turn_with_hand(self) -> None:
+        """Tell the grip's contacts how pad and body would accelerate apart if no joint's rate changed.
+
+        The engine leaves that term out (the Jacobian's own change), and a body held by a turning arm would slide out of the pads by
+        millimetres. Half of it: then pad and body go together in the middle of the step, which is how far they get.
+        """
+        contacts = self.data.contact
+        owners = self.model.geom_bodyid[contacts.geom]
+        rows = np.flatnonzero(self._is_pad[owners].any(axis=1) & (contacts.efc_address >= 0))
+        if not len(rows):
+            return
+        points, frames = contacts.pos[rows], contacts.frame[rows].reshape(-1, 3, 3)
+        (a, turn_a), (b, turn_b) = (self._coasting(bodies, points) for bodies in owners[rows].T)
+        first = contacts.efc_address[rows]
+        self.data.efc_aref[first[:, None] + np.arange(3)] -= 0.5 * np.einsum("kij,kj->ki", frames, b - a)
+        self.data.efc_aref[first + 3] -= 0.5 * np.einsum("kj,kj->k", frames[:, 0], turn_b - turn_a)
+
+    def _coasting(self, bodies: NDArray, points: NDArray) -> tuple[NDArray, NDArray]:
+        """How points (n, 3) of bodies (n,) accelerate, and how the bodies turn faster, while all joints keep their rates."""
+        data, spin = self.data, self.data.cvel[bodies, :3]
+        of_hand = self._is_pad[bodies][:, None]
+        mujoco.mj_jacDot(self.model, data, self._moves, self._turns, data.site_xpos[self._site], self._hand_bodies[0])
+        turn = np.where(of_hand, self._turns @ data.qvel, 0.0)
+        lever = points - np.where(of_hand, data.site_xpos[self._site], data.xpos[bodies])
+        start = np.where(of_hand, self._moves @ data.qvel, 0.0)
+        return start + _cross(turn, lever) + _cross(spin, _cross(spin, lever)), turn
+
     def _finger_push(self, to: Drive) -> float:
         """The drive's force outwards on each finger: as a spring that leans on what stops it, up to its force."""
         data = self.data
-        error = to.opening / 2 - float(data.qpos[self._finger_at].mean())
-        behind = to.speed / 2 - float(data.qvel[self.finger_dofs].mean())
-        self._integral = float(np.clip(self._integral + FINGER_INTEGRAL * error * self.dt, -to.force, to.force))
-        push = float(np.clip(self._finger_gain * error + self._finger_damping * behind + self._integral, -to.force, to.force))
+        error = (to.opening - self.opening) / 2
+        behind = (to.speed - float(data.qvel[self.finger_dofs].sum())) / 2
+        self._integral = min(max(self._integral + FINGER_INTEGRAL * error * self.dt, -to.force), to.force)
+        push = min(max(self._finger_gain * error + self._finger_damping * behind + self._integral, -to.force), to.force)
         self.finger_force = -push
         return push
 
@@ -96,7 +127,7 @@ class Simulation:
 
     @property
     def opening(self) -> float:
-        return 2.0 * float(self.data.qpos[self._finger_at].mean())
+        return float(self.data.qpos[self._finger_at].sum())
 
     def wrench(self) -> tuple[NDArray, NDArray]:
         """Force (3,) and torque (3,) about the hand's origin that all contacts put on crosspiece and fingers together."""
@@ -104,7 +135,7 @@ class Simulation:
         total = self.data.cfrc_ext[self._hand_bodies].sum(axis=0)
         force = total[3:]
         lever = self.data.subtree_com[self._base] - self.data.site_xpos[self._site]
-        return force.copy(), total[:3] + np.cross(lever, force)
+        return force, total[:3] + _cross(lever, force)
 
     def body_poses(self) -> dict[str, NDArray]:
         """T_world_body (4, 4) of the free bodies by name."""
@@ -161,6 +192,11 @@ class Simulation:
         mocap, ghost = self.model.body(f"ghost{number}").mocapid[0], self._ghosts[number]
         self.data.mocap_pos[mocap] = ghost.T_world_body[:3, 3] if there else NOWHERE
         self.data.mocap_quat[mocap] = to_wxyz(ghost.T_world_body)
+
+
+def _cross(a: NDArray, b: NDArray) -> NDArray:
+    """Cross products of (..., 3); numpy's own takes ten times as long on a handful."""
+    return a[..., NEXT] * b[..., LAST] - a[..., LAST] * b[..., NEXT]
 
 
 def _compiled(arm: Arm, bodies: Sequence[SolidBody], ghosts: Sequence[SolidBody]) -> Any:
