@@ -111,7 +111,8 @@ def operation_from_plain(plain: Any, index: int) -> Operation:
     try:
         return from_plain(given, KINDS[kind])
     except BadInput as error:
-        raise BadInput(f'step {index + 1}, "{kind}": {error}') from None
+        sentence = re.sub(r"\. - at `[^`]*`\.$", ".", str(error))  # our own sentences need no path beside them
+        raise BadInput(f'step {index + 1}, "{kind}": {sentence}') from None
 
 
 def _plain_scan(scan: Scan) -> dict[str, Any]:

@@ -18,8 +18,8 @@ from handey_studio.modeling.soundness import shrunk, sound, with_same_faces, wit
 
 PARALLEL_RAD = float(np.deg2rad(0.2))  # what the polyhedron itself takes for one plane
 LEAST_WAY_M = 1e-6
-HALVINGS = 16  # finds how far a move can go, as a share of what was asked
-SOUND_HALVINGS = 7  # the same where each try takes ten times as long
+HALVINGS = 24  # finds how far a move can go, as a share of what was asked
+SOUND_HALVINGS = 11  # the same where each try takes ten times as long
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +70,16 @@ def with_length(solid: Polyhedron, edge: Edge, end: int, length: float) -> Chang
 
 
 def with_angle(solid: Polyhedron, f: int, other: int, angle: float) -> Change:
-    """The solid with face f turned about its edge with `other` until the inner angle there is `angle` [rad]. Raises BadInput."""
+    """The solid with face f turned about its edge with `other` until they meet at `angle` [rad], measured as `SetAngle` says. Raises
+    BadInput."""
     edge = next((e for e in solid.edges if {e.left, e.right} == {f, other}), None)
     if edge is None:
         raise BadInput("the two faces do not meet at an edge; an angle can be set between neighbours only.")
-    now = np.pi - edge.dihedral
+    now = np.pi - abs(edge.dihedral)
     if abs(angle - now) < 1e-9:
         raise BadInput(f"the angle already is {measured(angle, 'rad')}; nothing would change.")
     along = solid.vertices[edge.end] - solid.vertices[edge.start]
-    sense = -1.0 if f == edge.right else 1.0
+    sense = np.sign(edge.dihedral) * (-1.0 if f == edge.right else 1.0)
 
     def turned(share: float) -> tuple[NDArray, NDArray]:
         normals, offsets = np.array(solid.normals), np.array(solid.offsets)
@@ -111,18 +112,16 @@ def _changed(
         return _rebuilt(solid, *planes(1.0))
     except BadInput as error:
         reason = str(error)
-    share = _limit(solid, planes)
-    limit = f"{'the limit is' if share < 1.0 else 'it must stay under'} {measured(share * asked, unit)}"
-    raise BadInput(f"{what} cannot {verb} by {measured(asked, unit)} that way, {limit}: {reason}")
+    limit = measured(_limit(solid, planes) * asked, unit)
+    raise BadInput(f"{what} cannot {verb} by {measured(asked, unit)} that way, the limit is {limit}: {reason}")
 
 
 def _limit(solid: Polyhedron, planes: Callable[[float], tuple[NDArray, NDArray]]) -> float:
     """The share of a change that is possible: as far as no edge turns round, which is soon checked, else what stays sound."""
     share = _last_that(lambda share: _still(_corners, solid, *planes(share)), 1.0, HALVINGS)
-    near = share * (1.0 - 1e-4)
-    if _still(_rebuilt, solid, *planes(near)):
+    if _still(_rebuilt, solid, *planes(share)):
         return share
-    return _last_that(lambda share: _still(_rebuilt, solid, *planes(share)), near, SOUND_HALVINGS)
+    return _last_that(lambda share: _still(_rebuilt, solid, *planes(share)), share, SOUND_HALVINGS)
 
 
 def _last_that(holds: Callable[[float], bool], high: float, halvings: int) -> float:

@@ -15,7 +15,7 @@ from handey_studio.modeling.references import CornerAt, EdgeAt, FaceAt, keep, nu
 
 Combine = Literal["join", "cut", "common"]
 MAX_SUGGESTED_CORNERS = 5000
-MAX_ANGLE_RAD = 6.283
+MAX_ANGLE_RAD = 3.1415
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +244,10 @@ class SetLength(Operation):
 
 @dataclass(frozen=True, eq=False)
 class SetAngle(Operation):
-    """The `face` turns about the edge that it shares with `other` until the solid has the inner angle `angle` [rad] there."""
+    """The `face` turns about the edge that it shares with `other` until the two meet at `angle` [rad].
+
+    It is measured through the solid where their edge is an outer one, and through the air where it is an inner one: less than 180°.
+    """
 
     kind: ClassVar[str] = "set angle"
     face: FaceAt

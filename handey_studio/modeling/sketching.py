@@ -130,13 +130,13 @@ def constrained(stroke: Stroke, constraint: Constraint) -> Stroke:
     """
     check_constraint(constraint, len(stroke.clicks))
     others = tuple(c for c in stroke.constraints if (c.kind, c.item, c.other) != (constraint.kind, constraint.item, constraint.other))
-    try:
-        return _sound(replace(stroke, constraints=(*others, constraint)))
-    except BadInput:
-        yielding = tuple(replace(c, on=False) if c.kind == "equal" and constraint.item in (c.item, c.other) else c for c in others)
-        if yielding == others:
-            raise
-        return _sound(replace(stroke, constraints=(*yielding, constraint)))
+    equal = [k for k, c in enumerate(others) if c.kind == "equal" and c.on]
+    for yielding in ([], *([k] for k in equal), equal):
+        kept = tuple(replace(c, on=c.on and k not in yielding) for k, c in enumerate(others))
+        following = replace(stroke, constraints=(*kept, constraint))
+        if solve(stroke.clicks, following.constraints)[1].max() < CONTRADICTED_M:
+            return _sound(following)
+    return _sound(replace(stroke, constraints=(*others, constraint)))
 
 
 def undone(stroke: Stroke) -> Stroke:
