@@ -202,7 +202,7 @@ class Select:
 
     def apply(self, state: State) -> State:
         if self.kind == "result":
-            state = with_view(state, time_s=0.0)
+            state = with_view(state, time_s=0.0, attempt=0)
         return with_view(state, **{self.kind: self.number})
 
 

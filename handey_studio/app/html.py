@@ -99,6 +99,12 @@ def picking(element: str, number: str) -> str:
     return f"const i=document.getElementById('{element}');{typed}(i,String({number}));{told}"
 
 
+def picking_share(element: str, whole: float) -> str:
+    """Script of a picture that puts where across it was clicked, as a share of `whole`, into a number field (an element's id)."""
+    share = "(event.clientX-this.getBoundingClientRect().left)/this.getBoundingClientRect().width"
+    return picking(element, f"({share}*{whole:.6g}).toFixed(3)")
+
+
 def heading(text: str) -> str:
     """The heading of a section."""
     return f'<div style="font-weight:650;font-size:12.5px;margin:8px 14px 2px">{esc(text)}</div>'

@@ -50,7 +50,7 @@ class JobDone:
             return state.job.done(replace(state, job=None), self.session)
         session = merged(state.session, self.session)
         state = replace(state, session=session, job=None, ledger_at=ROOT, ledger_page=0, ledger_entry=ROOT)
-        state = with_view(state, time_s=0.0, result=-1)
+        state = with_view(state, time_s=0.0, result=-1, attempt=0)
         result = session.result
         if result is None:
             return state

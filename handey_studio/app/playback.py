@@ -45,8 +45,8 @@ class TogglePlay:
         replay = state.replay
         if replay is None:
             return replace(state, playing=False)
-        if not state.playing and state.session.view.time_s >= replay.duration - 1e-6:
-            state = with_view(state, time_s=0.0)
+        if not state.playing and state.session.view.time_s >= replay.duration - 1e-6 and _next_attempt(state) == 0:
+            state = with_view(state, time_s=0.0, attempt=0)
         return replace(state, playing=not state.playing)
 
 
@@ -63,7 +63,23 @@ class Tick:
         time_s = state.session.view.time_s + self.seconds * state.speed
         if time_s < replay.duration:
             return with_view(state, time_s=time_s)
-        return with_view(state, time_s=0.0) if state.loop else replace(with_view(state, time_s=replay.duration), playing=False)
+        following = _next_attempt(state)
+        if following or state.loop:
+            return with_view(state, time_s=0.0, attempt=following)
+        return replace(with_view(state, time_s=replay.duration), playing=False)
+
+
+@dataclass(frozen=True)
+class LookAtAttempt:
+    """Look at another attempt of the same MOVE, at this time [s] of it."""
+
+    number: int
+    time_s: float = 0.0
+
+    def apply(self, state: State) -> State:
+        if not 0 <= self.number < len(state.attempts):
+            return state
+        return Seek(self.time_s).apply(with_view(state, attempt=self.number))
 
 
 @dataclass(frozen=True)
@@ -73,3 +89,8 @@ class SetPlayback:
 
     def apply(self, state: State) -> State:
         return replace(state, speed=self.speed or state.speed, loop=state.loop if self.loop is None else self.loop)
+
+
+def _next_attempt(state: State) -> int:
+    """The attempt that is played after the one that is looked at; 0, the first, after the last."""
+    return (state.attempt_number + 1) % max(len(state.attempts), 1)

@@ -11,10 +11,11 @@ from handey_studio.base import Entry
 from handey_studio.localization import Hypothesis
 from handey_studio.localization.explain import Explanation
 from handey_studio.modeling.draft import Draft
-from handey_studio.session import Replay, Session
+from handey_studio.session import Moment, Replay, Session, Told, attempts_of, replay_of
 from handey_studio.session.handling import Handling
 from handey_studio.session.ledger_tree import ROOT
-from handey_studio.task.plan import Carry, MoveCommand
+from handey_studio.task.performance import Performance
+from handey_studio.task.plan import Carry, MoveCommand, MovePlan
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Robot
 
@@ -134,11 +135,30 @@ class State:
 
     @property
     def replay(self) -> Replay | None:
-        """The plan that is looked at, played over time."""
-        result = self.session.result
-        if result is None or result.plan is None or not result.plan.steps:
-            return None
-        return _replay(self.robot, result.plan)
+        """The attempt that is looked at, played over time: what really happened in it, or the plan while that is not carried out."""
+        told = self.attempt
+        return None if told is None else _replay(self.robot, told.plan, told.performance)
+
+    @property
+    def attempts(self) -> tuple[Told, ...]:
+        """All attempts of the result that is looked at."""
+        return attempts_of(self.session.result) if self.session.result is not None else ()
+
+    @property
+    def attempt(self) -> Told | None:
+        """The one that is looked at, else the last."""
+        return self.attempts[self.attempt_number] if self.attempts else None
+
+    @property
+    def attempt_number(self) -> int:
+        """Its place among all, -1 where there is none."""
+        count, number = len(self.attempts), self.session.view.attempt
+        return number if 0 <= number < count else count - 1
+
+    @property
+    def moment(self) -> Moment | None:
+        """What holds at the time that is looked at."""
+        return self.replay.at(self.session.view.time_s) if self.replay is not None else None
 
     @property
     def carry(self) -> Carry | None:
@@ -249,9 +269,9 @@ def same(one: tuple | None, other: tuple | None) -> bool:
     return all(a is b or (isinstance(a, int | str) and a == b) for a, b in zip(one, other, strict=True))
 
 
-@lru_cache(maxsize=4)
-def _replay(robot: Robot, plan) -> Replay:
-    return Replay(robot, plan)
+@lru_cache(maxsize=8)
+def _replay(robot: Robot, plan: MovePlan, performance: Performance | None) -> Replay:
+    return replay_of(robot, Told(plan, performance))
 
 
 def _kept(session: Session) -> tuple:

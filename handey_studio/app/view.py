@@ -13,6 +13,7 @@ from handey_studio.app.panels.ledger import LedgerPanel
 from handey_studio.app.panels.looking import LookingPanel
 from handey_studio.app.panels.model import ModelPanel
 from handey_studio.app.panels.move import MovePanel
+from handey_studio.app.panels.running import HappenedPanel
 from handey_studio.app.panels.sensing import SensingPanel
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.panels.timeline import TimelinePanel
@@ -29,7 +30,7 @@ from handey_studio.app.scene.modelling.solid import SolidScene
 from handey_studio.app.scene.pair import PairScene
 from handey_studio.app.scene.parts import PartsScene
 from handey_studio.app.scene.pile import PileScene
-from handey_studio.app.scene.robot import RobotScene
+from handey_studio.app.scene.robot import PlannedArmScene, RobotScene
 from handey_studio.app.scene.sensing import SensingScene
 from handey_studio.app.scene.workcell import WorkcellScene
 from handey_studio.app.scene.wrist_box import WristBoxScene
@@ -52,7 +53,8 @@ class View:
     def __init__(self, server: viser.ViserServer, send: Send) -> None:
         self._server = server
         server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
-        scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), DepthScene(server), PartsScene(server, send)]
+        scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), PlannedArmScene(server)]
+        scenes += [DepthScene(server), PartsScene(server, send)]
         scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), HypothesisScene(server)]
         scenes += [PairScene(server), PlanScene(server), GraspScene(server), StandingScene(server)]
         scenes += [CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
@@ -90,7 +92,7 @@ def _left(gui: viser.GuiApi, send: Send) -> list[Any]:
 def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
     tabs = gui.add_tab_group()
     with tabs.add_tab("Result"):
-        result = ResultPanel(gui)
+        result = [ResultPanel(gui), HappenedPanel(gui, send)]
     with tabs.add_tab("Located"):
         located = SensingPanel(gui, send)
     with tabs.add_tab("Grasp"):
@@ -99,4 +101,4 @@ def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
         path = PathPanel(gui)
     with tabs.add_tab("Ledger"):
         ledger = LedgerPanel(gui, send)
-    return [result, located, grasp, path, ledger]
+    return [*result, located, grasp, path, ledger]

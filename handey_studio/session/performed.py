@@ -18,11 +18,13 @@ GONE = ("missed", "dropped")  # incidents after which the part is not in the fin
 
 @dataclass(frozen=True, eq=False)
 class Traces(Value):
-    """What was measured over the cell's time, of all motions together: `time_s` (n,) from the attempt's begin; `force_N` (n,) the wrist's,
-    `finger_N` (n,), `opening_m` (n,), and how far the hand's origin was off its command `off_m` (n,)."""
+    """What was measured over the cell's time, of all motions together: `time_s` (n,) from the attempt's begin; what the outside does to the
+    hand, `up_N` and `sideways_N` (n,); each finger's `finger_N` (n,); `opening_m` (n,); and how far the hand's origin was off its command,
+    `off_m` (n,)."""
 
     time_s: NDArray
-    force_N: NDArray
+    up_N: NDArray
+    sideways_N: NDArray
     finger_N: NDArray
     opening_m: NDArray
     off_m: NDArray
@@ -60,13 +62,13 @@ class PerformedReplay(Replay):
         times = self.traces.time_s
         q, q_command = between(time_s, times, self._joints[0]), between(time_s, times, self._joints[1])
         opening = float(np.interp(time_s, times, self.traces.opening_m))
-        hold = next((hold for hold in self._holds if hold.start <= time_s < hold.end), None)
+        hold = next((hold for hold in self.holds if hold.start <= time_s < hold.end), None)
         held = self.plan.part if hold is not None else None
         return Moment(time_s, self.step_at(time_s), q, opening, held, self._place(time_s, q, hold), q_command, self._lost(time_s))
 
     def let_go(self, time_s: float) -> bool:
         """Whether the part was carried and let go before a time [s]."""
-        return any(hold.end <= time_s for hold in self._holds)
+        return any(hold.end <= time_s for hold in self.holds)
 
     def clearance(self, time_s: float) -> float | None:
         """That of the plan [m] where it is nearest to what the arm really did; None in plans that did not keep it."""
@@ -82,10 +84,9 @@ class PerformedReplay(Replay):
         arm = arm_of(self.robot)
         places = [arm.hand_pose(q)[:, :3, 3] for q in self._joints]
         times = np.concatenate([one.start_s + one.recording.time_s for one in self.performance.performed])
-        force = np.linalg.norm(self._column("force_N"), axis=1)
-        return Traces(
-            times, force, self._column("finger_force_N"), self._column("opening_m"), np.linalg.norm(places[0] - places[1], axis=1)
-        )
+        force, off = self._column("force_N"), np.linalg.norm(places[0] - places[1], axis=1)
+        sideways = np.linalg.norm(force[:, :2], axis=1)
+        return Traces(times, force[:, 2], sideways, self._column("finger_force_N"), self._column("opening_m"), off)
 
     @cached_property
     def _joints(self) -> tuple[NDArray, NDArray]:
@@ -95,7 +96,7 @@ class PerformedReplay(Replay):
         return np.concatenate([getattr(one.recording, name) for one in self.performance.performed])
 
     @cached_property
-    def _holds(self) -> tuple[Hold, ...]:
+    def holds(self) -> tuple[Hold, ...]:
         """From each closing on the part until the fingers open, or until it was noticed that it fell."""
         gone = {incident.step for incident in self.performance.incidents if incident.kind in GONE}
         holds: list[Hold] = []
@@ -119,16 +120,16 @@ class PerformedReplay(Replay):
         arm = arm_of(self.robot)
         if hold is not None:
             return arm.hand_pose(q) @ hold.T_hand_part
-        before = [one for one in self._holds if one.end <= time_s]
+        before = [one for one in self.holds if one.end <= time_s]
         if not before:
             return self.plan.T_world_part_start
         check = self.performance.check
-        if before[-1] is self._holds[-1] and check is not None and check.T_world_part is not None:
+        if before[-1] is self.holds[-1] and check is not None and check.T_world_part is not None:
             return check.T_world_part
         return arm.hand_pose(between(before[-1].end, self.traces.time_s, self._joints[0])) @ before[-1].T_hand_part
 
     def _lost(self, time_s: float) -> bool:
-        before = [one for one in self._holds if one.end <= time_s]
+        before = [one for one in self.holds if one.end <= time_s]
         return bool(before) and before[-1].lost
 
 

@@ -15,12 +15,11 @@ from handey_studio.app.panels.ledger import context, entry_html, ledger_html
 from handey_studio.app.panels.sensing import counted, found_html, picked, word_of
 from handey_studio.app.panels.timeline import strip
 from handey_studio.app.scene.depth import elevation_span, stride_of, thinned
-from handey_studio.app.state import State
+from handey_studio.app.state import State, opened, with_view
 from handey_studio.app.svg_plane import grasp_plane_svg
 from handey_studio.base import Ledger
 from handey_studio.motion import CSpaceSummary
 from handey_studio.sensing.depth_map import DepthMap
-from handey_studio.session import Replay
 from handey_studio.session.looking import unexplained
 from handey_studio.world import Library
 from tests.session.samples import T_START, full_session, hand_made_scan, library
@@ -82,10 +81,10 @@ def test_words_of_others_are_escaped_everywhere(session):
     assert all("<script" not in text for text in shown)
 
 
-def test_the_timeline_strip_names_the_step_at_its_time(session, robot):
-    replay = Replay(robot, session.results[0].plan)
-    assert "step 3 of 5: transfer, holding l_block#1" in strip(replay, 5.0, False, 1.0)
-    assert "left:50.000%" in strip(replay, 5.0, True, 1.0)
+def test_the_timeline_strip_names_the_step_at_its_time(session, tmp_path):
+    state = with_view(opened(library(tmp_path), session, None), time_s=5.0)
+    assert "step 3 of 5: transfer, holding l_block#1" in strip(state)
+    assert "left:50.000%" in strip(state)
 
 
 def told(session, entries):

@@ -152,7 +152,7 @@ def performed_session(folder) -> Session:
     recovery = Recovery(
         dropped, why, ("the hand went home", "the table was scanned anew"), RuledOut("grasp", "it slipped out of this grasp")
     )
-    check = Check("seen where it was to be", planned.plan.T_world_part_goal, 0.0004, 0.002)
+    check = Check("seen", "seen where it was to be", planned.plan.T_world_part_goal, 0.0004, 0.002)
     second = replace(hand_made_performance(planned.plan), check=check)
     attempt = Attempt(planned.plan, first, recovery)
     done = replace(planned, status="done", performance=second, attempts=(attempt,), T_world_part_reached=check.T_world_part, physics=True)

@@ -46,7 +46,7 @@ def test_a_carried_part_hangs_in_the_hand_as_it_is_and_stays_where_it_was_let_go
 
 def test_what_the_scan_saw_counts_more_than_the_joints(replay):
     seen = from_xyz_rpy((0.1, 0.2, 0.3))
-    checked = PerformedReplay(replay.robot, replay.plan, replace(replay.performance, check=Check("seen", seen, 0.1, 0.0)))
+    checked = PerformedReplay(replay.robot, replay.plan, replace(replay.performance, check=Check("seen", "seen", seen, 0.1, 0.0)))
     np.testing.assert_allclose(checked.at(checked.duration).T_world_part, seen)
     np.testing.assert_allclose(checked.at(1.0).T_world_part, T_START)
 

@@ -39,7 +39,7 @@ class PathPanel:
         replay = new.replay
         if replay is None:
             set_to(self._pane, content=html.empty(NO_PATH, "path-empty"))
-        elif old is None or old.session.result is not new.session.result or old.session.view.time_s != new.session.view.time_s:
+        elif old is None or old.replay is not replay or old.session.view.time_s != new.session.view.time_s:
             moment = replay.at(new.session.view.time_s)
             space = replay.carry_at(moment.time_s).space
             picture = slice_html(space, moment.q_rad) if space is not None else html.empty(NO_SPACE)
@@ -72,8 +72,7 @@ def result_html(result: MoveResult) -> str:
         metres, radians = pose_difference(result.T_world_part_reached, result.plan.T_world_part_goal)
         pane += html.facts([("Reached within", f"{1e3 * metres:.2f} mm, {np.rad2deg(radians):.2f}°")])
     timing = [(stage, f"{seconds:.2f} s") for stage, seconds in result.timing_s.items()]
-    physics = "simulated with physics" if result.physics else "held part attached rigidly (no physics)"
-    return pane + html.heading("Seconds a stage") + html.facts([*timing, ("Execution", physics)], "timing")
+    return pane + html.heading("Seconds a stage") + html.facts(timing, "timing")
 
 
 def plan_facts(plan: MovePlan) -> list[tuple[str, str]]:

@@ -102,4 +102,4 @@ def _unbroken(points: NDArray) -> NDArray:
 
 
 def _looks(state: State) -> tuple:
-    return id(state.session.result), state.session.view.time_s, LAYER in state.session.view.hidden_layers
+    return id(state.replay), state.session.view.time_s, LAYER in state.session.view.hidden_layers

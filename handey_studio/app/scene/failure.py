@@ -5,8 +5,8 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import palette
+from handey_studio.app.scene.arm_model import creased
 from handey_studio.app.scene.parts import add_solid
-from handey_studio.app.scene.robot import creased
 from handey_studio.app.scene.units import SCALE, place, scaled
 from handey_studio.app.state import State
 from handey_studio.base import Entry, Posture

@@ -26,7 +26,7 @@ class PlanScene:
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
             return
-        if old is None or old.session.result is not new.session.result:
+        if old is None or old.replay is not new.replay:
             self._build(new)
         self._show(new)
 
@@ -72,4 +72,4 @@ def clearance_beads(replay: Replay) -> tuple[NDArray, NDArray] | None:
 
 
 def _looks(state: State) -> tuple:
-    return id(state.session.result), state.session.view.hidden_layers
+    return id(state.replay), state.session.view.hidden_layers

@@ -63,16 +63,17 @@ class PartsScene:
 
     def _place(self, state: State) -> None:
         hidden = state.session.view.hidden_layers
-        replay = state.replay
+        replay, moment = state.replay, state.moment
         for placed in state.session.located:
-            moved = replay is not None and replay.plan.part == placed.name
-            T = replay.at(state.session.view.time_s).T_world_part if replay is not None and moved else placed.T_world_part
+            played = moment if replay is not None and replay.plan.part == placed.name else None
+            T = placed.T_world_part if played is None else played.T_world_part
             moved = not np.allclose(T, placed.T_world_part, atol=1e-6)
             place(self._frames[placed.name], T)
-            self._frames[placed.name].visible = "located parts" not in hidden
+            self._frames[placed.name].visible = "located parts" not in hidden and not (played is not None and played.lost)
             self._faces[placed.name].visible = moved or state.hypothesis is None  # readings are looked at beneath those that stand
             self._labels[placed.name].visible = "labels" not in hidden and state.hypothesis is None
 
 
 def _looks(state: State) -> tuple:
-    return state.session.result, state.session.view.time_s, state.session.view.hidden_layers, state.hypothesis is None
+    view = state.session.view
+    return id(state.replay), view.time_s, view.hidden_layers, state.hypothesis is None
