@@ -14,7 +14,7 @@ from handey_studio.modeling.patches_finding import patch_at, patches_of
 from handey_studio.modeling.patches_outlines import lost_at_rims
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.suggest_fit import Fit, Rays, fit_of, rays_of
-from handey_studio.modeling.suggest_planes import Body, BodyPlane, Squared, clues_of, planes_of_body, square_frame, squared
+from handey_studio.modeling.suggest_planes import Body, BodyPlane, Squared, body_planes
 from handey_studio.modeling.suggest_shapes import Shape, shapes_of
 from handey_studio.modeling.suggestion import Relation, Suggestion
 
@@ -78,12 +78,8 @@ def suggest_object(
     options: SuggestOptions = SuggestOptions(),
 ) -> Suggestion:
     """The suggestion for object `number` of scan `scan`, with what the other scans show of it."""
-    body = Body(patches, Ts, _members(patches, Ts, scan, number, options))
-    raw = clues_of(body)
-    frame = square_frame(raw)
-    pairs = [squared(clue, frame, body.ring(clue.of)) for clue in raw]
-    clues = [clue for clue, _ in pairs]
-    planes = planes_of_body(clues)
+    body = Body(patches, Ts, members_of(patches, Ts, scan, number, options))
+    planes, clues, frame, squares = body_planes(body)
     short = SHORT_LOSSES * max(lost_at_rims(scans[k].view) for k, _ in body.members)
     views = _views(scans, body)
     ledger, best = Ledger(), None
@@ -95,7 +91,6 @@ def suggest_object(
     if best is None:
         return _none(_why(ledger.entries), ledger.entries, tuple(body.of_all()))
     _, solid, fit = best
-    squares = [square for _, square in pairs if square is not None]
     sources = tuple(_source(solid, f, planes, body) for f in range(len(solid.faces)))
     relations = _relations(solid, planes, squares)
     return Suggestion(solid, sources, relations, ledger.entries, fit.rms, fit.explained, tuple(body.of_all()))
@@ -105,7 +100,7 @@ def _none(reason: str, entries: tuple[Entry, ...] = (), of: tuple[tuple[int, int
     return Suggestion(None, (), (), entries, 0.0, 0.0, of, reason)
 
 
-def _members(
+def members_of(
     patches: Sequence[Patches], Ts: Sequence[NDArray], scan: int, number: int, options: SuggestOptions
 ) -> list[tuple[int, tuple[int, ...]]]:
     """The patches of the object in each scan: of the other scans the object that lies most where it does."""

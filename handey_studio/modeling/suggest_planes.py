@@ -90,6 +90,16 @@ class Body(NamedTuple):
         return [(scan, patch) for scan, numbers in self.members for patch in numbers]
 
 
+def body_planes(body: Body) -> tuple[tuple[BodyPlane, ...], list[Clue], NDArray, list[Squared]]:
+    """The planes of an object, the surest first; the clues that tell of them, made square where they may be; the three directions (3, 3),
+    rows, that these are square to; and what was made square."""
+    raw = clues_of(body)
+    frame = square_frame(raw)
+    pairs = [squared(clue, frame, body.ring(clue.of)) for clue in raw]
+    clues = [clue for clue, _ in pairs]
+    return planes_of_body(clues), clues, frame, [square for _, square in pairs if square is not None]
+
+
 def clues_of(body: Body) -> list[Clue]:
     """All that tells of planes, in the model frame."""
     clues = []
