@@ -1,20 +1,15 @@
 """The `.draft` file: a part's scans and history on disk. JSON, gzipped when it holds scans; bounded, versioned, written atomically."""
 
-import gzip
-import io
 import os
 import re
-import zlib
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from handey_studio.base import BadInput
 from handey_studio.base.coding import from_plain, to_plain
+from handey_studio.base.documents import check_schema, packed, read_document, unpacked, write_document
 from handey_studio.base.errors import unknown_name
-from handey_studio.base.files import replace_file
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.modeling.draft import MAX_OPERATIONS, MAX_SCANS, Draft
 from handey_studio.modeling.operations import KINDS, Operation
@@ -28,18 +23,13 @@ SUFFIX = ".draft"
 MAX_FILE_BYTES = 128_000_000
 MAX_CONTENT_BYTES = 512_000_000
 MAX_PIXELS = 16_000_000
-GZIP_MAGIC = b"\x1f\x8b"
 PROJECTIONS: dict[str, type[Pinhole] | type[Orthographic]] = {"pinhole": Pinhole, "orthographic": Orthographic}
 
 
 def draft_to_bytes(draft: Draft) -> bytes:
     """What the file holds. The same draft gives the same bytes."""
-    content = msgspec.json.encode({"schema": f"{SCHEMA}{VERSION}"} | draft_to_plain(draft))
-    if len(content) > MAX_CONTENT_BYTES:
-        raise BadInput(f'draft "{draft.name}" holds {len(content)} bytes, the limit is {MAX_CONTENT_BYTES}; take out a scan.')
-    if b'"base64"' not in content:
-        return msgspec.json.format(content, indent=1) + b"\n"
-    return gzip.compress(content, compresslevel=3, mtime=0)
+    plain = {"schema": f"{SCHEMA}{VERSION}"} | draft_to_plain(draft)
+    return packed(plain, MAX_CONTENT_BYTES, f'draft "{draft.name}"', "take out a scan")
 
 
 def draft_from_bytes(data: bytes, source: str) -> Draft:
@@ -48,8 +38,8 @@ def draft_from_bytes(data: bytes, source: str) -> Draft:
     Raises BadInput with one sentence.
     """
     try:
-        plain = _decoded(_inflated(data))
-        _check_version(plain)
+        plain = unpacked(data, "draft", MAX_FILE_BYTES, MAX_CONTENT_BYTES)
+        check_schema(plain, SCHEMA, VERSION, "a draft of Handey Studio")
         return draft_from_plain(plain)
     except BadInput as error:
         raise BadInput(f'draft "{source}" cannot be opened: {error}') from None
@@ -59,28 +49,12 @@ def draft_from_bytes(data: bytes, source: str) -> Draft:
 
 def read_draft(path: str | os.PathLike) -> Draft:
     """The draft in a file. Raises BadInput with one sentence for anything that is wrong with it."""
-    path = Path(path)
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_FILE_BYTES + 1)
-    except FileNotFoundError:
-        raise BadInput(f'draft "{path}" does not exist.') from None
-    except OSError as error:
-        raise BadInput(f'draft "{path}" cannot be read: {error.strerror}.') from None
-    return draft_from_bytes(data, str(path))
+    return draft_from_bytes(read_document(Path(path), "draft", MAX_FILE_BYTES), str(path))
 
 
 def write_draft(path: str | os.PathLike, draft: Draft) -> None:
     """Write a draft so that the file is the old one or the new one whole, whatever happens meanwhile. Raises BadInput."""
-    path = Path(path)
-    if path.suffix != SUFFIX:
-        raise BadInput(f'draft file "{path}" must end in {SUFFIX}.')
-    data = draft_to_bytes(draft)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(path, data)
-    except OSError as error:
-        raise BadInput(f'draft "{path}" cannot be written: {error.strerror}.') from None
+    write_document(path, SUFFIX, draft_to_bytes(draft), "draft")
 
 
 def draft_to_plain(draft: Draft) -> dict[str, Any]:
@@ -160,35 +134,3 @@ def _of_kind(plain: Any, key: str, kind: type) -> Any:
     if not isinstance(plain, dict) or not isinstance(plain.get(key), kind) or plain.get(key) is None:
         raise BadInput(f'"{key}" is missing or not a {kind.__name__}.')
     return plain[key]
-
-
-def _check_version(plain: Any) -> None:
-    schema = plain.get("schema") if isinstance(plain, dict) else None
-    match = re.fullmatch(rf"{SCHEMA}([0-9]{{1,9}})", schema) if isinstance(schema, str) else None
-    if match is None or int(match[1]) < 1:
-        raise BadInput(f'it is not a draft of Handey Studio: its "schema" must be "{SCHEMA}{VERSION}".')
-    if int(match[1]) > VERSION:
-        raise BadInput(f"it has format {match[1]}, this version of Handey Studio reads up to {VERSION}; update Handey Studio.")
-
-
-def _inflated(data: bytes) -> bytes:
-    """The JSON inside, without ever inflating more than the limit."""
-    if len(data) > MAX_FILE_BYTES:
-        raise BadInput(f"it is larger than {MAX_FILE_BYTES} bytes, the limit for a draft.")
-    if not data.startswith(GZIP_MAGIC):
-        return data
-    try:
-        with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
-            content = file.read(MAX_CONTENT_BYTES + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise BadInput(f"it is damaged or cut short: {str(error).rstrip('.')}.") from None
-    if len(content) > MAX_CONTENT_BYTES:
-        raise BadInput(f"it unpacks to more than {MAX_CONTENT_BYTES} bytes, the limit for a draft.")
-    return content
-
-
-def _decoded(content: bytes) -> Any:
-    try:
-        return msgspec.json.decode(content)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise BadInput(f"it is not valid JSON: {str(error).rstrip('.')}.") from None

@@ -14,6 +14,7 @@ from hypothesis.extra import numpy as hnp
 
 from handey_studio.base import BadInput
 from handey_studio.base.coding import from_plain, plain_array, to_plain
+from handey_studio.base.documents import GZIP_MAGIC
 from handey_studio.session import files, find_session, own_file, read_session, session_from_bytes, session_to_bytes, write_session
 from tests.session.samples import fresh_session, full_session, library
 
@@ -31,7 +32,7 @@ def fresh(tmp_path_factory):
 def plain_of(session) -> dict:
     """The JSON inside a session's file."""
     data = session_to_bytes(session)
-    return json.loads(gzip.decompress(data) if data.startswith(files.GZIP_MAGIC) else data)
+    return json.loads(gzip.decompress(data) if data.startswith(GZIP_MAGIC) else data)
 
 
 def refused(plain) -> str:
@@ -202,13 +203,13 @@ def test_a_write_that_fails_leaves_the_old_file_whole(full, fresh, tmp_path, mon
     assert read_session(path) == fresh and list(tmp_path.iterdir()) == [path]
 
 
-def test_missing_files_and_folders_are_told(tmp_path):
+def test_missing_files_and_folders_are_told(fresh, tmp_path):
     with pytest.raises(BadInput, match="does not exist"):
         read_session(tmp_path / "none.handey")
     with pytest.raises(BadInput, match="cannot be read"):
         read_session(tmp_path)
     with pytest.raises(BadInput, match=r"must end in \.handey"):
-        write_session(tmp_path / "a.json", None)
+        write_session(tmp_path / "a.json", fresh)
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "a/b", "a\\b", ".hidden", " a", "a\n", "x" * 121, "a:b", "\0"])
