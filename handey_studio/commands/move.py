@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handey_studio.base import BadInput, Entry, describe
-from handey_studio.commands.arguments import DONE, FAILED, Lines, check_output, positive, write_json
+from handey_studio.commands.arguments import DONE, FAILED, Lines, check_output, positive, whole, write_json
 from handey_studio.world import Library
 
 if TYPE_CHECKING:
@@ -23,7 +23,9 @@ def add_arguments(move: argparse.ArgumentParser) -> None:
     move.add_argument("--resume", action="store_true", help="go on where the saved session stopped: what is done is not done again")
     move.add_argument("--step", action="store_true", help="only the next command")
     move.add_argument("--go-on", action="store_true", help="take the next command after one that failed")
-    move.add_argument("--attempts", type=positive, default=3, help="how often a MOVE is tried, the first time among them (default: 3)")
+    move.add_argument(
+        "--attempts", type=positive, help="how often a MOVE is tried, the first time among them, instead of the session's own"
+    )
     move.add_argument("--recordings", action="store_true", help="what was measured goes into the JSON too")
 
 
@@ -34,20 +36,20 @@ def add_common(move: argparse.ArgumentParser) -> None:
     move.add_argument("--to", metavar="DESTINATION", help="x,y,z[,roll,pitch,yaw] (metres, degrees), on:PART[:POSE] or in:x0,y0,x1,y1")
     move.add_argument("--robot", help="a robot of the library, or a folder with a robot.toml, instead of the session's own")
     move.add_argument("--seed", type=int, help="instead of the session's own seed")
+    move.add_argument("--improve", type=whole, metavar="N", help="look at N more plans once there is one, and take the best")
     move.add_argument("--json", type=Path, help="where the steps, the certificate and the ledger go")
     move.add_argument("--save", type=Path, metavar="SESSION2", help="where the session with its results goes")
 
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.session.sequence import from_the_start, run_list, states_of
-    from handey_studio.task import RecoveryOptions
 
     session, library = opened(given)
     if not given.resume:
         session = from_the_start(session)
     earlier, watching = len(session.results), Watching()
-    recovery = RecoveryOptions(attempts=given.attempts)
-    session = run_list(session, library, watching, 1 if given.step else None, given.go_on, recovery)
+    session = replace(session, attempts=given.attempts or session.attempts)
+    session = run_list(session, library, watching, 1 if given.step else None, given.go_on)
     states = states_of(session)
     for number, (command, state) in enumerate(zip(session.commands, states, strict=True), 1):
         if len(states) > 1:
@@ -80,7 +82,8 @@ def opened(given: argparse.Namespace) -> "tuple[Session, Library]":
     if given.robot is not None:
         session = replace(session, workcell=replace(session.workcell, robot=given.robot))
     seed = session.seed if given.seed is None else given.seed
-    return replace(session, commands=_commands(given, session), seed=seed), library
+    improve = session.improve if given.improve is None else given.improve
+    return replace(session, commands=_commands(given, session), seed=seed, improve=improve), library
 
 
 def write_outputs(given: argparse.Namespace, session: "Session", library: Library, results: "Sequence[MoveResult]") -> None:

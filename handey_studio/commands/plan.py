@@ -13,14 +13,14 @@ add_arguments = add_common
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.session.run import cell_of, station_of
-    from handey_studio.task import MoveOptions, run_move
+    from handey_studio.session.run import cell_of, move_options, station_of
+    from handey_studio.task import run_move
 
     session, library = opened(given)
     station, cell = station_of(session, library), cell_of(session, library)
     results = []
     for command in session.commands:
-        outcome = run_move(station, cell, command, MoveOptions(seed=session.seed), False, Lines())
+        outcome = run_move(station, cell, command, move_options(session), False, Lines())
         session = replace(session, scene=outcome.scene, results=(*results, outcome.result), states=())
         results.append(outcome.result)
         tell(outcome.result)

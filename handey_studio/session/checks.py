@@ -19,6 +19,7 @@ from handey_studio.task.plan import MovePlan
 MAX_NAME = 120
 NOT_IN_NAMES = '/\\:*?"<>|'
 MAX_PARTS, MAX_COMMANDS, MAX_RESULTS, MAX_BODIES = 200, 500, 500, 500
+MAX_ATTEMPTS, MAX_IMPROVE = 20, 1000
 MAX_MAP_SIDE, MAX_CELL_M = 4000, 0.05
 MAX_COORDINATE_M = 1e3
 MOST_TURN = 20.0  # [rad] hand angles are told from the grasp plane's axes, at most a few turns on
@@ -69,6 +70,9 @@ def _check_counts(session: Session) -> None:
     for thing, count, limit in counts:
         if count > limit:
             raise BadInput(f"the session has {count} {thing}, the limit is {limit}.")
+    for thing, number, least, most in (("attempts", session.attempts, 1, MAX_ATTEMPTS), ("improve", session.improve, 0, MAX_IMPROVE)):
+        if not least <= number <= most:
+            raise BadInput(f"{thing} is {number}; it must be from {least} to {most}.")
     missing = sorted(set(session.workcell.parts) - {part.name for part in session.parts})
     if missing:
         raise BadInput(f"the session lacks the model of {', '.join(missing)}.")

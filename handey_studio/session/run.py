@@ -7,7 +7,18 @@ from handey_studio.base import BadInput, Progress, Share
 from handey_studio.cell.protocol import CannotAct
 from handey_studio.cell.simulated import SimulatedCell, simulated_cell
 from handey_studio.session.session import Session
-from handey_studio.task import MoveOptions, MoveResult, Order, RecoveryOptions, Station, carry_out, check_command, plan_in, sense
+from handey_studio.task import (
+    MoveOptions,
+    MoveResult,
+    Order,
+    RecoveryOptions,
+    SearchOptions,
+    Station,
+    carry_out,
+    check_command,
+    plan_in,
+    sense,
+)
 from handey_studio.world import Library
 
 SENSED, PLANNED = 0.25, 0.6  # how much of a whole MOVE's progress is behind when it is sensed, and when it is planned
@@ -19,9 +30,7 @@ class ShowingProgress(Progress, Protocol):
     def show(self, session: Session) -> None: ...
 
 
-def run_session(
-    session: Session, library: Library, execute: bool, progress: ShowingProgress, recovery: RecoveryOptions = RecoveryOptions()
-) -> Session:
+def run_session(session: Session, library: Library, execute: bool, progress: ShowingProgress) -> Session:
     """Sense, plan and, if asked, execute the session's last MOVE in its cell; the session with all that was found.
 
     A plan that was made for this MOVE and looked at is carried out as it is. Nothing found is a result in the session, not an
@@ -38,7 +47,7 @@ def run_session(
             progress.show(session)
     if not execute or not is_planned(session) or progress.cancelled:
         return session
-    return _executed(session, station, cell, recovery, progress)
+    return _executed(session, station, cell, progress)
 
 
 def is_planned(session: Session) -> bool:
@@ -55,19 +64,29 @@ def _sensed_and_planned(session: Session, station: Station, cell: SimulatedCell,
         return replace(session, scene=None, results=(MoveResult(command, "failed", str(error)),))
     session = replace(session, scene=scene, results=())
     progress.show(session)
-    options = MoveOptions(seed=session.seed)
-    result = plan_in(station, scene, command, cell.joints(), cell.opening(), options, Share(progress, SENSED, PLANNED))
+    start = cell.joints(), cell.opening()
+    result = plan_in(station, scene, command, *start, move_options(session), Share(progress, SENSED, PLANNED))
     return replace(session, results=(result,))
 
 
-def _executed(session: Session, station: Station, cell: SimulatedCell, recovery: RecoveryOptions, progress: ShowingProgress) -> Session:
+def _executed(session: Session, station: Station, cell: SimulatedCell, progress: ShowingProgress) -> Session:
     """The scene of a session is the one that its plan was made in: a recovery may have made a new one."""
     if session.scene is None:
         return session
     planned = session.results[-1]
-    order = Order(station, planned.command, MoveOptions(seed=session.seed), recovery)
+    order = Order(station, planned.command, move_options(session), recovery_options(session))
     outcome = carry_out(order, session.scene, planned, cell, Share(progress, PLANNED, 1.0))
     return replace(session, scene=outcome.scene, results=(outcome.result,), cell_now=cell.setup_now())
+
+
+def move_options(session: Session) -> MoveOptions:
+    """How the session's MOVEs are planned."""
+    return MoveOptions(seed=session.seed, search=SearchOptions(improve=session.improve))
+
+
+def recovery_options(session: Session) -> RecoveryOptions:
+    """How often they are tried."""
+    return RecoveryOptions(attempts=session.attempts)
 
 
 def station_of(session: Session, library: Library) -> Station:

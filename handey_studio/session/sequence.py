@@ -5,9 +5,9 @@ from dataclasses import replace
 from handey_studio.base import Share
 from handey_studio.cell.protocol import Cell
 from handey_studio.cell.simulated import SimulatedCell
-from handey_studio.session.run import ShowingProgress, cell_of, station_of
+from handey_studio.session.run import ShowingProgress, cell_of, move_options, recovery_options, station_of
 from handey_studio.session.session import CommandState, Session
-from handey_studio.task import MoveOptions, Outcome, RecoveryOptions, Scene, Station, check_command, run_move
+from handey_studio.task import Outcome, Scene, Station, check_command, run_move
 from handey_studio.world import Library
 
 OVER = ("done", "skipped")
@@ -41,7 +41,6 @@ def run_list(
     progress: ShowingProgress,
     most: int | None = None,
     go_on: bool = False,
-    recovery: RecoveryOptions = RecoveryOptions(),
 ) -> Session:
     """Run the session's commands from the first that is not over: all of them, or at most `most` (1 is a step).
 
@@ -57,7 +56,7 @@ def run_list(
         session = _with_state(session, number, CommandState("running"))
         progress.show(session)
         share = Share(progress, count / len(wanted), (count + 1) / len(wanted))
-        outcome = _one(session, number, station, cell, after, recovery, share)
+        outcome = _one(session, number, station, cell, after, share)
         after = outcome.after
         session = _with_outcome(session, number, outcome, cell)
         undone = states_of(session)[number].status != "done"
@@ -69,11 +68,9 @@ def run_list(
     return session
 
 
-def _one(
-    session: Session, number: int, station: Station, cell: Cell, scene: Scene | None, recovery: RecoveryOptions, progress: Share
-) -> Outcome:
+def _one(session: Session, number: int, station: Station, cell: Cell, scene: Scene | None, progress: Share) -> Outcome:
     """One command; the scene that was seen after the one before serves, if nothing moved since."""
-    options = MoveOptions(seed=session.seed)
+    options, recovery = move_options(session), recovery_options(session)
     return run_move(station, cell, session.commands[number], options, progress=progress, recovery=recovery, scene=scene)
 
 

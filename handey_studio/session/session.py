@@ -70,7 +70,8 @@ class Session(Value):
     """One working session, self-contained: it opens on a machine that lacks its parts.
 
     `parts` are the models that `workcell.parts` names. `scene` and `results` are what sensing and planning found,
-    empty before. `states` tells how far each of the commands is, one each, or none while they were never run as a list.
+    empty before. `attempts` is how often a MOVE is tried, the first time among them; `improve` how many more plans are looked at once there
+    is one. `states` tells how far each of the commands is, one each, or none while they were never run as a list.
     `cell_now` is where the simulated bodies stand after what was executed, None while nothing was; only the cell reads it.
     `draft` is the part that is being modelled, None while none is.
     """
@@ -80,6 +81,8 @@ class Session(Value):
     parts: tuple[Part, ...] = ()
     commands: tuple[MoveCommand, ...] = ()
     seed: int = 0
+    attempts: int = 3
+    improve: int = 0
     scene: Scene | None = None
     results: tuple[MoveResult, ...] = ()
     states: tuple[CommandState, ...] = ()
