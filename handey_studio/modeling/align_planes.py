@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.geometry.transforms import transform
+from handey_studio.geometry.transforms import apply, transform
 from handey_studio.modeling.suggest_planes import BodyPlane
 
 ALIKE_RAD = np.deg2rad(4.0)  # angles and normals that may be the same
@@ -41,9 +41,11 @@ def pairs_at(T: NDArray, model: Sequence[BodyPlane], new: Sequence[BodyPlane]) -
     """The planes (model, new) that lie together at a pose, each new one with the nearest."""
     pairs = []
     for b, plane in enumerate(new):
-        normal = T[:3, :3] @ plane.normal
-        offset = plane.offset + float(normal @ T[:3, 3])
-        near = [(abs(offset - other.offset), a) for a, other in enumerate(model) if _same(normal, offset, plane, other)]
+        normal, middle = T[:3, :3] @ plane.normal, apply(T, plane.middle)
+        apart = [abs(float(other.normal @ middle) - other.offset) for other in model]
+        near = [
+            (apart[a], a) for a, other in enumerate(model) if normal @ other.normal > np.cos(ALIKE_RAD) and apart[a] < _limit(plane, other)
+        ]
         if near:
             pairs.append((min(near)[1], b))
     return tuple(pairs)
@@ -57,9 +59,9 @@ def independent(pairs: Sequence[tuple[int, int]], model: Sequence[BodyPlane]) ->
     return int((np.linalg.svd(normals, compute_uv=False) > 0.3).sum())
 
 
-def _same(normal: NDArray, offset: float, plane: BodyPlane, other: BodyPlane) -> bool:
-    limit = max(LEAST_SAME_M, SAME_SIGMAS * float(np.hypot(plane.sigma, other.sigma)))
-    return bool(normal @ other.normal > np.cos(ALIKE_RAD) and abs(offset - other.offset) < limit)
+def _limit(plane: BodyPlane, other: BodyPlane) -> float:
+    """How far apart [m] two planes may be and still be one."""
+    return max(LEAST_SAME_M, SAME_SIGMAS * float(np.hypot(plane.sigma, other.sigma)))
 
 
 def _size(plane: BodyPlane) -> float:
@@ -122,9 +124,8 @@ def _along(
     for a, b in single:
         cosine = float(model[a].normal @ axis)
         if abs(cosine) > np.cos(ALIKE_RAD):
-            shift = (model[a].offset - new[b].offset) * np.sign(cosine)
-            limit = max(LEAST_SAME_M, SAME_SIGMAS * float(np.hypot(model[a].sigma, new[b].sigma)))
-            votes.append((shift, _worth_of([(a, b)], model, new), limit))
+            shift = (model[a].offset - float(model[a].normal @ R @ new[b].middle)) * np.sign(cosine)
+            votes.append((shift, _worth_of([(a, b)], model, new), _limit(new[b], model[a])))
     ranked = sorted(votes, key=lambda vote: -sum(worth for shift, worth, limit in votes if abs(shift - vote[0]) < max(limit, vote[2])))
     kept: list[float] = []
     for shift, _, limit in ranked:

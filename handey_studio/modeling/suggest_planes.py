@@ -108,7 +108,8 @@ def clues_of(body: Body) -> list[Clue]:
         below = _stood_on(body, scan, numbers)
         on_table = any(border.kind == "foot" for k in numbers for border in body.patch((scan, k)).borders[0])
         if on_table or not below:
-            clues.append(Clue(-rotate(T, UP), T[:3, 3].copy(), CERTAIN_M, np.deg2rad(0.05), "support", 0.0, (scan, -1)))
+            below_it = np.concatenate([body.patch((scan, k)).rings[0] for k in numbers]).mean(axis=0) * (1.0, 1.0, 0.0)
+            clues.append(Clue(-rotate(T, UP), apply(T, below_it), CERTAIN_M, np.deg2rad(0.05), "support", 0.0, (scan, -1)))
         clues += below
         for number in numbers:
             clues.append(_seen(body, (scan, number)))
