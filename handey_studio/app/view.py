@@ -13,6 +13,7 @@ from handey_studio.app.panels.ledger import LedgerPanel
 from handey_studio.app.panels.looking import LookingPanel
 from handey_studio.app.panels.model import ModelPanel
 from handey_studio.app.panels.move import MovePanel
+from handey_studio.app.panels.part import PartPanel
 from handey_studio.app.panels.running import HappenedPanel
 from handey_studio.app.panels.sensing import SensingPanel
 from handey_studio.app.panels.session import SessionPanel
@@ -93,6 +94,8 @@ def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
     tabs = gui.add_tab_group()
     with tabs.add_tab("Result"):
         result = [ResultPanel(gui), HappenedPanel(gui, send)]
+    with tabs.add_tab("Part"):
+        part = PartPanel(gui, send)
     with tabs.add_tab("Located"):
         located = SensingPanel(gui, send)
     with tabs.add_tab("Grasp"):
@@ -101,4 +104,4 @@ def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
         path = PathPanel(gui)
     with tabs.add_tab("Ledger"):
         ledger = LedgerPanel(gui, send)
-    return [*result, located, grasp, path, ledger]
+    return [*result, part, located, grasp, path, ledger]

@@ -78,20 +78,26 @@ def set_to(handle: Any, **properties: Any) -> None:
             setattr(handle, key, value)
 
 
+PRESS_TAB = """
+let tries = 0;
+const waiting = setInterval(() => {
+  const tab = [...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent.trim() === LABEL);
+  if (tab) {
+    document.body.addEventListener('keydown', event => event.stopPropagation(), {once: true});
+    tab.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter', bubbles: true}));
+  }
+  if (tab || ++tries > 100) clearInterval(waiting);
+}, 100);
+"""  # a tab of a panel answers to keys and to the pointer, not to a plain click; the key must not reach the page's shortcuts
+
+
 def show_tab(client: viser.ClientHandle, label: str) -> None:
     """Bring the tab of that name to the front in one browser; this version of viser has no call for it, so the page presses it itself."""
     connection, message = getattr(client, "_websock_connection", None), getattr(_messages, "RunJavascriptMessage", None)
     if connection is None or message is None:
         log.warning("this version of viser cannot bring a tab to the front")
         return
-    find = f"[...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent.trim() === {json.dumps(label)})"
-    press = "if (tab) { tab.click(); clearInterval(waiting); }"
-    connection.queue_message(
-        message(
-            source=f"{{let tries = 0; const waiting = setInterval(() => {{ const tab = {find}; {press} "
-            f"if (++tries > 100) clearInterval(waiting); }}, 100);}}"
-        )
-    )
+    connection.queue_message(message(source=PRESS_TAB.replace("LABEL", json.dumps(label))))
 
 
 def close_share_tunnel(server: viser.ViserServer) -> None:

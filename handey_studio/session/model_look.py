@@ -18,6 +18,8 @@ from handey_studio.modeling.snapping import Pickable, pickable
 from handey_studio.modeling.suggestion import Alignment
 
 GAP_M = 0.03  # between a scan that is not aligned yet and those beside it
+AROUND_M = 0.05  # so much of the support is shown around what stands on it
+FLOOR_NOISES = 4.0
 HATCH_M = 0.004
 ASSUMED = "assumed"
 
@@ -62,8 +64,27 @@ def clickable(scans: tuple[Scan, ...], poses: tuple[bytes, ...], patches: tuple[
 
 
 def points_of(scan: Scan, T_model_scan: NDArray) -> NDArray:
-    """A scan's readings (n, 3) [m] in the model's frame."""
-    return apply(T_model_scan, _readings(scan))
+    """A scan's readings (n, 3) [m] above its support, in the model's frame."""
+    readings = _readings(scan)
+    return apply(T_model_scan, readings[readings[:, 2] > _floor(scan)])
+
+
+def ground_of(scan: Scan) -> NDArray:
+    """A scan's readings (n, 3) [m] of its support around what stands on it, in the scan's own world."""
+    readings = _readings(scan)
+    above = readings[:, 2] > _floor(scan)
+    if not above.any():
+        return readings
+    low, high = np.percentile(readings[above, :2], (1.0, 99.0), axis=0)
+    near = ((readings[:, :2] > low - AROUND_M) & (readings[:, :2] < high + AROUND_M)).all(axis=1)
+    return readings[~above & near]
+
+
+@lru_cache(maxsize=16)
+def spacing_of(scan: Scan) -> float:
+    """How far apart [m] neighbouring readings are, across the view."""
+    depth = float(np.nanmedian(scan.view.depth))
+    return 1.0 / float(scan.view.projection.pixels_per_metre(depth))
 
 
 @lru_cache(maxsize=16)
@@ -89,6 +110,11 @@ def _hatched(solid: Polyhedron, face: int, spacing: float) -> NDArray:
     pieces = [piece for piece in shapely.get_parts(shapely.intersection(long, polygon)) if piece.geom_type == "LineString"]
     ends = np.array([shapely.get_coordinates(piece)[[0, -1]] for piece in pieces if not piece.is_empty]).reshape(-1, 2, 2)
     return T[:3, 3] + ends @ T[:3, :2].T
+
+
+def _floor(scan: Scan) -> float:
+    """The height [m] above which a reading is no longer the support's."""
+    return max(1e-3, FLOOR_NOISES * scan.view.noise)
 
 
 def _beside(scans: Sequence[Scan], poses: Sequence[NDArray], scan: Scan) -> NDArray:

@@ -2,16 +2,26 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from handey_studio.base import BadInput, Progress
 from handey_studio.cell.protocol import CannotAct
 from handey_studio.cell.turning import turned_over
+from handey_studio.geometry import Polyhedron
+from handey_studio.geometry.transforms import rotation_about
 from handey_studio.modeling.draft import Draft
+from handey_studio.modeling.replay import Built
 from handey_studio.modeling.scans import scan_of_map
+from handey_studio.modeling.truth_values import Truth
+from handey_studio.session.model_look import assumed_faces
 from handey_studio.session.run import cell_of, station_of
 from handey_studio.session.session import Session
 from handey_studio.task import sense
 from handey_studio.world import Library, Part
+from handey_studio.world.part import Provenance
+from handey_studio.world.part_writing import check_part_name
 
+LEVEL_M = 1e-4  # an edge that rises by less lies level
 SCANNED = "scan"  # what the scan is called until it joins a draft
 
 
@@ -42,6 +52,29 @@ def find_parts(session: Session, library: Library, execute: bool, progress: Prog
     except CannotAct as error:
         raise BadInput(str(error)) from None
     return replace(session, scene=scene, results=())
+
+
+def part_of(solid: Polyhedron, name: str, density: float, friction: float, provenance: Provenance) -> Part:
+    """A modelled solid as a part: its frame has the model's z, the origin below its middle on the plane that it stands on, and x along
+    its longest level edge. Raises BadInput when the name cannot be used."""
+    ways = np.array([solid.vertices[edge.end] - solid.vertices[edge.start] for edge in solid.edges])
+    level = np.where(np.abs(ways[:, 2]) < LEVEL_M, np.linalg.norm(ways, axis=1), 0.0)
+    x, y, _ = ways[int(np.argmax(level))] if level.max() > 0.0 else (1.0, 0.0, 0.0)
+    turn = rotation_about((0.0, 0.0, 1.0), -float(np.arctan2(y, x) % np.pi))
+    turned = solid.vertices @ turn.T
+    middle = (turned.min(axis=0) + turned.max(axis=0)) / 2.0
+    moved = np.round(turned - (middle[0], middle[1], turned[:, 2].min()), 9) + 0.0
+    return Part(check_part_name(name), Polyhedron(moved, solid.faces), density, friction, provenance=provenance)
+
+
+def provenance_of(draft: Draft, built: Built, judged: Truth | None) -> Provenance:
+    """Where a model came from, as its part remembers it."""
+    scans = tuple(scan.name for scan in draft.scans)
+    source = f"modelled from {len(scans)} scan{'s' if len(scans) != 1 else ''}" if scans else "modelled by hand"
+    assumed = assumed_faces(built.sources)
+    if judged is None or not scans:
+        return Provenance(source, scans, assumed_faces=assumed)
+    return Provenance(source, scans, judged.rms, judged.explained, judged.seen, assumed)
 
 
 def with_part(session: Session, part: Part) -> Session:

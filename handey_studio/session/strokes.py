@@ -16,20 +16,15 @@ from handey_studio.modeling.sketch_plane import guides_in_plane, sketch_plane
 from handey_studio.modeling.sketching import Guides
 from handey_studio.modeling.snap import MODEL, Snap
 from handey_studio.modeling.snapping import Pickable
+from handey_studio.modeling.taking import reference_of
 
 IN_PLANE_M = 0.003  # an edge this near to a sketch's plane is in it
 PARALLEL = float(np.cos(np.deg2rad(0.5)))
 
 
-def reference_of(snap: Snap) -> FaceAt | EdgeAt | CornerAt | None:
+def on_model(snap: Snap) -> FaceAt | EdgeAt | CornerAt | None:
     """The face, edge or corner of the model that was clicked; None for anything else."""
-    if snap.owner != MODEL:
-        return None
-    if snap.kind == "vertex":
-        return CornerAt(snap.point)
-    if snap.kind == "edge":
-        return EdgeAt(snap.point, snap.direction)
-    return FaceAt(snap.point, snap.normal) if snap.normal.any() else None
+    return reference_of(snap) if snap.owner == MODEL else None
 
 
 def box_of(clicks: Sequence[Snap], eye: NDArray, depth: float | None, combine: Combine) -> Box:

@@ -20,13 +20,13 @@ LIBRARY = Library.choose()
 def test_bodies_have_their_shape():
     session = read_session(find_session(LIBRARY, "figure1"))
     for body in session.workcell.setup.bodies:
-        part = solid_of(session, body)
+        part = solid_of(session, LIBRARY, body)
         assert part is not None
         if body.size is not None:
             assert np.allclose(np.ptp(part.solid.vertices, axis=0), body.size)
         else:
             assert part.name == body.part
-    assert solid_of(session, TrueBody("gear", np.eye(4), part="gear")) is None
+    assert solid_of(session, LIBRARY, TrueBody("gear", np.eye(4), part="gear")) is None
 
 
 def test_the_pile_is_shown_until_there_is_a_scan():

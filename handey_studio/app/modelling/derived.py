@@ -9,14 +9,15 @@ from handey_studio.app.state import State, same
 from handey_studio.modeling.draft import Draft
 from handey_studio.modeling.operations import AlignScan, Operation, TakeSuggestion
 from handey_studio.modeling.patches import Patches
-from handey_studio.modeling.replay import Built
+from handey_studio.modeling.patches_finding import patch_at
+from handey_studio.modeling.replay import Built, Step
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.snapping import Pickable
 from handey_studio.modeling.suggestion import Alignment, Suggestion
 from handey_studio.modeling.truth_values import Truth
 from handey_studio.session.model_look import built_of, clickable, shown_poses, unaligned
 
-SUGGESTION, ALIGNMENT, TRUTH = "suggestion", "alignment", "truth"
+SUGGESTION, ALIGNMENT, TRUTH, GRASPS = "suggestion", "alignment", "truth", "grasps"
 
 
 def draft_of(state: State) -> Draft | None:
@@ -31,6 +32,12 @@ def built(state: State) -> Built | None:
         return None
     steps = len(draft.operations)
     return built_of(draft, steps if state.model.step is None else min(state.model.step, steps))
+
+
+def steps(state: State) -> tuple[Step, ...]:
+    """How each step of the whole model went, also of those after the one that is looked at."""
+    draft = draft_of(state)
+    return built_of(draft, len(draft.operations)).steps if draft is not None else ()
 
 
 def outcome(state: State, name: str, asked: tuple | None) -> Any:
@@ -65,7 +72,17 @@ def to_align(state: State) -> tuple | None:
     scan = unaligned(draft) if draft is not None else None
     if draft is None or scan is None or to_segment(state) is not None:
         return None
-    return draft.scans, built_of(draft, len(draft.operations)).poses, scan, *found_patches(state)
+    look, poses = state.model, built_of(draft, len(draft.operations)).poses
+    return draft.scans, poses, scan, object_number(state), look.new_object, look.pairs, *found_patches(state)
+
+
+def object_number(state: State) -> int:
+    """Which object of the first scan is modelled, by its number in `Patches.objects`."""
+    at, patches = state.model.object_at, found_patches(state)
+    if at is None or at[0] != 0 or not patches or patches[0] is None:
+        return 0
+    patch = patch_at(patches[0], *at[1:])
+    return patch.object if patch is not None else 0
 
 
 def alignment(state: State) -> Alignment | None:
@@ -105,6 +122,17 @@ def to_judge(state: State) -> tuple | None:
 def truth(state: State) -> Truth | None:
     """How the solid agrees with its scans."""
     return outcome(state, TRUTH, to_judge(state))
+
+
+def to_grasp(state: State) -> tuple | None:
+    """The solid whose grasps are to be counted, for the robot's hand."""
+    shown = built(state)
+    return None if shown is None or shown.solid is None else (shown.solid, state.robot)
+
+
+def grasps(state: State) -> tuple[int, int] | None:
+    """How many grasp classes and approach groups the hand has for the solid."""
+    return outcome(state, GRASPS, to_grasp(state))
 
 
 def scan_poses(state: State) -> tuple[NDArray, ...]:

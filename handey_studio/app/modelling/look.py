@@ -71,9 +71,10 @@ class ModelLook:
 
     `clicks` and `drawing` are what the active `tool` has so far, `picked` what is selected. `object_at` (scan, u, v) is the pixel at
     which an object was clicked that a model is wanted of. `step`: the model is shown as after that many steps, None for all of them.
-    `alternative` counts the poses that fit a new scan. `check` is the check that is pointed at. `waiting` and `reading` are uploads under
-    way; in the scan `trial` the model is looked for. `eye` (3,) [m] is where the last click came from. `worked` keeps what was worked out
-    in the background, by its name.
+    Of a new scan `new_object` is the number of the object that is aligned, by picked `pairs` of points if there are three: in the model's
+    frame and in the scan's world (3,) [m]; `alternative` counts the poses that fit. `check` is the check that is pointed at, `part` the
+    library's part that is. In the scan `trial` the model is looked for. `waiting` and `reading` are uploads under way, `saves` counts
+    parts that were kept. `eye` (3,) [m] is where the last click came from. `worked` keeps what was worked out in the background, by name.
     """
 
     open: bool = False
@@ -84,11 +85,15 @@ class ModelLook:
     settings: ToolSettings = ToolSettings()
     material: Material = Material()
     object_at: tuple[int, float, float] | None = None
+    new_object: int = 0
+    pairs: tuple[tuple[NDArray, NDArray], ...] = ()
     step: int | None = None
     alternative: int = 0
     check: int = -1
     colours: str = BY_SCAN
     unit: str = "m"
+    part: str = ""
+    saves: int = 0
     waiting: Waiting | None = None
     reading: Upload | None = None
     trial: Scan | None = None

@@ -54,7 +54,10 @@ class Order:
     done: Callable[[State, Session], State]
 
     def run(self, bench: Any) -> State:
-        state = bench.state
+        return self.given(bench, bench.state)
+
+    def given(self, bench: Any, state: State) -> State:
+        """The order given in a state that may not be the bench's yet."""
         if state.job is not None:
             raise BadInput(BUSY)
         state = JobStarted(False, self.title, self.done).apply(state)
@@ -82,7 +85,7 @@ def with_new_scan(state: State, scan: Scan) -> State:
     draft = state.session.draft or Draft(NAME)
     number = 1 + max((int(old.name.split()[-1]) for old in draft.scans if old.name.split()[-1].isdigit()), default=0)
     named = replace(scan, name=f"scan {number}")
-    state = replace(state, model=replace(state.model, open=True, step=None, clicks=(), tool=SELECT, alternative=0))
+    state = replace(state, model=replace(state.model, open=True, step=None, clicks=(), tool=SELECT, alternative=0, new_object=0, pairs=()))
     return state.changed(f"add {named.name}", replace(state.session, draft=with_scan(draft, named)))
 
 

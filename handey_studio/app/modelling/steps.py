@@ -12,7 +12,6 @@ from handey_studio.base import BadInput
 from handey_studio.modeling.draft import Draft
 from handey_studio.modeling.history import edited, removed, with_operation
 from handey_studio.modeling.operations import (
-    AlignScan,
     ConfirmFace,
     Delete,
     MoveCorner,
@@ -22,12 +21,12 @@ from handey_studio.modeling.operations import (
     SetAngle,
     SetDistance,
     SetLength,
-    TakeSuggestion,
 )
 from handey_studio.modeling.references import CornerAt, EdgeAt, FaceAt
+from handey_studio.modeling.taking import take, take_alignment
 from handey_studio.session.model_look import proposals, unaligned
 from handey_studio.session.step_numbers import with_number
-from handey_studio.session.strokes import opposite_face, reference_of
+from handey_studio.session.strokes import on_model, opposite_face
 
 R = TypeVar("R", FaceAt, EdgeAt, CornerAt)
 NO_MODEL = "there is no model yet; scan an object or upload a scan first."
@@ -51,8 +50,7 @@ class TakeModel:
         suggestion = derived.suggestion(state)
         if suggestion is None or suggestion.solid is None:
             raise BadInput("no model is suggested; click an object in the scan, or draw one with the tools.")
-        solid = suggestion.solid
-        return operated(state, TakeSuggestion(solid.vertices, tuple(face.loops for face in solid.faces), suggestion.sources))
+        return operated(state, take(suggestion))
 
 
 @dataclass(frozen=True)
@@ -64,10 +62,7 @@ class AcceptAlignment:
         scan, offered = unaligned(draft), proposals(found)
         if scan is None or found is None or not offered:
             raise BadInput("no pose is proposed for a scan; pick pairs of points on both scans.")
-        number = state.model.alternative % len(offered)
-        rms = found.rms if number == 0 else found.others[number - 1][1]
-        state = replace(state, model=replace(state.model, alternative=0))
-        return operated(state, AlignScan(scan.name, offered[number], rms))
+        return operated(state, take_alignment(scan.name, found, state.model.alternative % len(offered)))
 
 
 @dataclass(frozen=True)
@@ -181,7 +176,7 @@ class EditStep:
 
 def two_faces(state: State) -> tuple[FaceAt, FaceAt]:
     """The two faces that are selected, or the one and the face opposite to it. Raises BadInput when there are none."""
-    references = [reference_of(snap) for snap in state.model.picked]
+    references = [on_model(snap) for snap in state.model.picked]
     faces = [reference for reference in references if isinstance(reference, FaceAt)]
     shown = derived.built(state)
     if len(faces) == 2:
@@ -200,7 +195,7 @@ def _picked(state: State, kind: type[R], words: str) -> R:
 
 
 def _reference(state: State) -> FaceAt | EdgeAt | CornerAt | None:
-    return reference_of(state.model.picked[-1]) if state.model.picked else None
+    return on_model(state.model.picked[-1]) if state.model.picked else None
 
 
 def _needed(state: State) -> Draft:

@@ -6,17 +6,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.app.modelling.derived import built, draft_of, scan_poses, scene_to_click, wants_suggestion
+from handey_studio.app.modelling.derived import built, draft_of, found_patches, scan_poses, scene_to_click, wants_suggestion
 from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE, Drawing
 from handey_studio.app.modelling.steps import operated
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
+from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.modeling.operations import CutByPlane, Extrude, Mirror, Sketch
 from handey_studio.modeling.references import FaceAt
 from handey_studio.modeling.sketching import SketchOptions, clicked, closed
 from handey_studio.modeling.snap import MODEL, Ray, Snap, SnapOptions
 from handey_studio.modeling.snapping import pick
-from handey_studio.session.strokes import box_of, guides_of, on_plane, pixel_of, plane_normal, plane_of, reference_of, sketch_frame
+from handey_studio.session.model_look import unaligned
+from handey_studio.session.strokes import box_of, guides_of, on_model, on_plane, pixel_of, plane_normal, plane_of, sketch_frame
 
 BOX, SKETCH, EXTRUDE, CUT, MIRROR, MEASURE, POINTS = "box", "sketch", "extrude", "cut", "mirror", "measure", "align"
 
@@ -85,11 +87,48 @@ def _snap_options(state: State) -> SnapOptions:
 def _selected(state: State, snap: Snap | None, add: bool) -> State:
     """What was clicked is selected; of a scan that is still to be modelled, its object is."""
     draft = draft_of(state)
+    new = unaligned(draft) if draft is not None else None
+    if snap is not None and draft is not None and new is not None and snap.owner >= 0 and draft.scans[snap.owner] is new:
+        return _new_object(state, snap)
     if snap is not None and snap.owner != MODEL and draft is not None and wants_suggestion(draft):
         at = pixel_of(draft.scans[snap.owner], scan_poses(state)[snap.owner], snap.point)
         return replace(state, model=replace(state.model, object_at=(snap.owner, *at), picked=()))
     picked = () if snap is None else ((*state.model.picked[-1:], snap) if add else (snap,))
     return replace(state, model=replace(state.model, picked=picked))
+
+
+def _new_object(state: State, snap: Snap) -> State:
+    """Of the scan that is not aligned yet, the object that was clicked is the one that is modelled."""
+    patches = found_patches(state)[snap.owner]
+    if patches is None or not 0 <= snap.number < len(patches.patches):
+        return state
+    return replace(state, model=replace(state.model, new_object=patches.patches[snap.number].object, pairs=(), alternative=0))
+
+
+def _points_clicked(state: State, snap: Snap) -> State:
+    """By turns a point of the aligned scans (or the model) and the same one on the new scan."""
+    draft = draft_of(state)
+    new = unaligned(draft) if draft is not None else None
+    if draft is None or new is None:
+        return state
+    on_new = snap.owner >= 0 and draft.scans[snap.owner] is new
+    if on_new != (len(state.model.clicks) % 2 == 1):
+        raise BadInput("click by turns: first the point on the aligned scans, then the same point on the new one.")
+    return _clicked(state, snap)
+
+
+def _aligned_by_points(state: State) -> State:
+    """The pairs are given to the alignment, which refines the pose that they tell."""
+    draft, clicks = draft_of(state), state.model.clicks
+    new = unaligned(draft) if draft is not None else None
+    if draft is None or new is None:
+        raise BadInput("every scan is aligned already; add a scan first.")
+    if len(clicks) < 6:
+        raise BadInput(f"there are {len(clicks) // 2} pairs of points; click at least 3.")
+    to_new = inverse(scan_poses(state)[draft.scans.index(new)])
+    points = [snap.point for snap in clicks]
+    pairs = tuple((a, apply(to_new, b)) for a, b in zip(points[::2], points[1::2], strict=False))
+    return ChooseTool(SELECT).apply(replace(state, model=replace(state.model, pairs=pairs, alternative=0)))
 
 
 def _clicked(state: State, snap: Snap) -> State:
@@ -111,7 +150,7 @@ def _sketch_clicked(state: State, snap: Snap) -> State:
     if scene is None:
         return state
     T = sketch_frame(snap, scene)
-    on = reference_of(snap)
+    on = on_model(snap)
     drawing = Drawing(T, on if isinstance(on, FaceAt) else None, guides_of(scene, T))
     return replace(state, model=replace(state.model, drawing=drawing))
 
@@ -224,5 +263,12 @@ CLICKED: dict[str, Callable[[State, Snap], State]] = {
     CUT: _plane_clicked,
     MIRROR: _plane_clicked,
     MEASURE: _measure_clicked,
+    POINTS: _points_clicked,
 }
-FINISHED: dict[str, Callable[[State], State]] = {SKETCH: _close_sketch, EXTRUDE: _extrude, CUT: _cut, MIRROR: _mirrored}
+FINISHED: dict[str, Callable[[State], State]] = {
+    SKETCH: _close_sketch,
+    EXTRUDE: _extrude,
+    CUT: _cut,
+    MIRROR: _mirrored,
+    POINTS: _aligned_by_points,
+}

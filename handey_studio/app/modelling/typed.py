@@ -12,7 +12,7 @@ from handey_studio.app.state import State
 from handey_studio.geometry import Polyhedron
 from handey_studio.modeling.lookup import edge_at, face_at
 from handey_studio.modeling.references import EdgeAt, FaceAt
-from handey_studio.session.strokes import PARALLEL, opposite_face, reference_of
+from handey_studio.session.strokes import PARALLEL, on_model, opposite_face
 
 AXES = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
 
@@ -30,7 +30,7 @@ class Typed:
 def typed_options(state: State) -> tuple[Typed, ...]:
     """What can be typed for what is selected, the likeliest first; nothing while nothing of the model is."""
     shown = built(state)
-    references = [reference for snap in state.model.picked if (reference := reference_of(snap)) is not None]
+    references = [reference for snap in state.model.picked if (reference := on_model(snap)) is not None]
     if shown is None or shown.solid is None or not references:
         return ()
     faces = [reference for reference in references if isinstance(reference, FaceAt)]

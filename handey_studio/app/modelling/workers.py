@@ -4,34 +4,46 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.app.background import Background
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import Worked
 from handey_studio.app.modelling.scanning import ScanRead
+from handey_studio.app.modelling.showing import look_at
 from handey_studio.app.state import State
+from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron
+from handey_studio.grasping import grasp_classes, grasp_groups
+from handey_studio.modeling.align import align
 from handey_studio.modeling.patches import Patches
 from handey_studio.modeling.patches_finding import patches_of
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.suggest import suggest
-from handey_studio.modeling.suggestion import Suggestion
+from handey_studio.modeling.suggestion import Alignment, Suggestion
 from handey_studio.modeling.truth import truth
 from handey_studio.modeling.truth_values import Truth
 from handey_studio.session.model_files import scan_of_upload
+from handey_studio.world import Part, Robot
 
 KEPT_PATCHES = 24
 
 
 @dataclass(frozen=True, eq=False)
 class Segmented:
-    """The planar faces of a scan were found."""
+    """The planar faces of a scan were found; of a first scan, every camera goes to its largest object."""
 
     worked: Worked
 
-    def apply(self, state: State) -> State:
-        return replace(state, model=replace(state.model, patches=(*state.model.patches, self.worked)[-KEPT_PATCHES:]))
+    def run(self, bench: Any) -> State:
+        model = bench.state.model
+        state = replace(bench.state, model=replace(model, patches=(*model.patches, self.worked)[-KEPT_PATCHES:]))
+        draft, found = derived.draft_of(state), self.worked.outcome
+        if draft is not None and self.worked.asked[0] is draft.scans[0] and found is not None and found.objects:
+            rings = [ring for number in found.objects[0] for ring in found.patches[number].rings]
+            look_at(bench, np.concatenate([*rings, *(ring * (1.0, 1.0, 0.0) for ring in rings)]), None)
+        return state
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +65,30 @@ def modelling_workers(send: Callable[[Any], None]) -> tuple[Background, ...]:
     return (
         segmenter,
         reader,
+        _worker(send, derived.ALIGNMENT, derived.to_align, aligned),
         _worker(send, derived.SUGGESTION, derived.to_suggest, suggested),
         _worker(send, derived.TRUTH, derived.to_judge, judged),
+        _worker(send, derived.GRASPS, derived.to_grasp, counted_grasps),
     )
+
+
+def aligned(
+    scans: tuple[Scan, ...],
+    poses: tuple[tuple[str, NDArray], ...],
+    new: Scan,
+    number: int,
+    new_number: int,
+    pairs: tuple[tuple[NDArray, NDArray], ...],
+    *patches: Patches,
+) -> Alignment:
+    """How the new one of the scans may lie; `number` and `new_number` name the object in the first scan and in the new one."""
+    known, found = dict(poses), dict(zip([scan.name for scan in scans], patches, strict=True))
+    placed = [scan for scan in scans if scan.name in known]
+    Ts = [known[scan.name] for scan in placed]
+    try:
+        return align(placed, Ts, new, [found[scan.name] for scan in placed], found[new.name], (number, new_number), pairs)
+    except BadInput as error:
+        return Alignment(None, (), 0.0, (), (), str(error).rstrip("."))
 
 
 def suggested(
@@ -71,6 +104,12 @@ def judged(solid: Polyhedron, scans: tuple[Scan, ...], poses: tuple[tuple[str, N
     known = dict(poses)
     aligned = tuple(scan for scan in scans if scan.name in known)
     return truth(solid, aligned, tuple(known[scan.name] for scan in aligned))
+
+
+def counted_grasps(solid: Polyhedron, robot: Robot) -> tuple[int, int]:
+    """How many grasp classes and approach groups a hand has for a solid."""
+    part = Part("model", solid)
+    return len(grasp_classes(part, robot.hand)[0]), len(grasp_groups(part, robot.hand)[0])
 
 
 def _to_read(state: State) -> tuple | None:

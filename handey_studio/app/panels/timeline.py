@@ -22,7 +22,7 @@ class TimelinePanel:
     """A strip of what was done or is planned, the plots of what was measured, a slider in seconds, and the playing."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
-        panel = gui.add_panel()
+        self._panel = panel = gui.add_panel()
         with panel.add_tab("Timeline", viser.Icon.MOVIE):
             self._strip = gui.add_html("")
             self._seek: Any = gui.add_number("Time picked (s)", 0.0, step=0.001)  # set by a click into a picture, which hides it
@@ -36,6 +36,8 @@ class TimelinePanel:
         on_click(self._buttons, send, _pressed)
 
     def render(self, old: State | None, new: State) -> None:
+        if old is not None and old.model.open != new.model.open:
+            self._panel.minimize() if new.model.open else self._panel.expand()
         if old is not None and _looks(old) == _looks(new):
             return
         replay, time_s = new.replay, new.session.view.time_s

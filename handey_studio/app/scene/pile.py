@@ -11,7 +11,7 @@ from handey_studio.app.state import State
 from handey_studio.cell import TrueBody
 from handey_studio.geometry import box
 from handey_studio.session import Session
-from handey_studio.world import Part
+from handey_studio.world import Library, Part
 
 ROOT = "/pile"
 
@@ -25,19 +25,19 @@ class PileScene:
 
     def render(self, old: State | None, new: State) -> None:
         if old is None or _setup(old.session) is not _setup(new.session):
-            self._build(new.session)
+            self._build(new)
             old = None
         shown = _shown(new)
         if old is None or shown != _shown(old):
             for frame in self._frames:
                 frame.visible = shown
 
-    def _build(self, session: Session) -> None:
+    def _build(self, state: State) -> None:
         for frame in self._frames:
             frame.remove()
-        setup = _setup(session)
+        setup = _setup(state.session)
         bodies = () if setup.drop else setup.bodies  # what is still to fall stands nowhere yet
-        solids = [(body, solid_of(session, body)) for body in bodies]
+        solids = [(body, solid_of(state.session, state.library, body)) for body in bodies]
         self._frames = [
             add_solid(self._server.scene, f"{ROOT}/{number}", part, palette.UNSCANNED, body.T_world_body)[0]
             for number, (body, part) in enumerate(solids)
@@ -49,11 +49,12 @@ def _shown(state: State) -> bool:
     return state.session.scan is None and not state.model.open
 
 
-def solid_of(session: Session, body: TrueBody) -> Part | None:
-    """The shape of a body: a part of the session, or a cuboid; None when the session does not have that part."""
+def solid_of(session: Session, library: Library, body: TrueBody) -> Part | None:
+    """The shape of a body: a part of the session or else of the library, or a cuboid; None when nobody knows that part."""
     if body.size is not None:
         return Part(body.name, box(body.size))
-    return session.part(body.part) if body.part else None
+    known = session.part(body.part) if body.part else None
+    return library.part(body.part) if known is None and body.part in library.part_files() else known
 
 
 def _setup(session: Session):

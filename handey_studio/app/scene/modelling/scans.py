@@ -14,11 +14,11 @@ from handey_studio.app.scene.units import scaled
 from handey_studio.app.state import State
 from handey_studio.geometry.transforms import apply
 from handey_studio.modeling.patches import Patches
-from handey_studio.session.model_look import points_of
+from handey_studio.session.model_look import ground_of, points_of, spacing_of
 
 ROOT = "/model/scans"
 MAX_POINTS = 40_000
-POINT_SIZE = 0.018
+POINT_SHARE = 0.8  # of the readings' spacing
 SCAN_COLOURS: tuple[palette.RGB, ...] = ((96, 122, 152), (204, 121, 64), (86, 150, 110), (150, 110, 170))
 RIM: palette.RGB = (30, 60, 90)
 
@@ -41,18 +41,23 @@ class ScanScene:
         for number, (scan, pose) in enumerate(zip(draft.scans, poses, strict=True)):
             colour = SCAN_COLOURS[number % len(SCAN_COLOURS)]
             if judged is None:
-                self._add_points(f"{ROOT}/{number}/points", points_of(scan, pose), np.array(colour, dtype=np.uint8))
+                self._add_points(f"{ROOT}/{number}/points", points_of(scan, pose), np.array(colour, dtype=np.uint8), spacing_of(scan))
+            if number == 0:
+                self._add_points(f"{ROOT}/ground", ground_of(scan), np.array(palette.PALE, dtype=np.uint8), spacing_of(scan))
             self._add_outlines(f"{ROOT}/{number}/outlines", patches[number], pose)
         if judged is not None:
+            limit = distance_limit([told.noise for told in judged.scans])
+            spacing = {scan.name: spacing_of(scan) for scan in draft.scans}
             for number, told in enumerate(judged.scans):
-                limit = distance_limit([scan.noise for scan in judged.scans])
-                self._add_points(f"{ROOT}/{number}/distances", told.points, residual_colours(told.distances / limit))
+                colours = residual_colours(told.distances / limit)
+                self._add_points(f"{ROOT}/{number}/distances", told.points, colours, spacing[told.name])
 
-    def _add_points(self, name: str, points: NDArray, colours: NDArray) -> None:
+    def _add_points(self, name: str, points: NDArray, colours: NDArray, spacing: float) -> None:
         step = max(1, len(points) // MAX_POINTS)
         thinned = colours if colours.ndim == 1 else colours[::step]
+        size = float(scaled(POINT_SHARE * spacing * np.sqrt(step)))
         self._scene.add_point_cloud(
-            name, scaled(points[::step]), thinned, point_size=POINT_SIZE, point_shape="square", precision="float32", point_shading="flat"
+            name, scaled(points[::step]), thinned, point_size=size, point_shape="circle", precision="float32", point_shading="flat"
         )
 
     def _add_outlines(self, name: str, found: Patches | None, T_model_scan: NDArray) -> None:

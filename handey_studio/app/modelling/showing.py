@@ -1,0 +1,47 @@
+"""How the model is looked at: its colours, a check that is pointed at, and the camera that goes to what is new."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handey_studio.app.modelling import derived
+from handey_studio.app.state import State
+
+AWAY = np.array([0.42, -0.80, 0.72])  # from the front, the side and above
+DISTANCES = 3.0  # extents of an object from which one looks at it
+
+
+@dataclass(frozen=True)
+class ColourBy:
+    """The readings' colours tell the scan, or their distance from the model."""
+
+    colours: str
+
+    def apply(self, state: State) -> State:
+        return replace(state, model=replace(state.model, colours=self.colours))
+
+
+@dataclass(frozen=True)
+class PointAtCheck:
+    """The faces of a check are shown in red, and one browser's camera goes there; again: no longer."""
+
+    number: int
+    client: int | None
+
+    def run(self, bench: Any) -> State:
+        state = bench.state
+        number = -1 if state.model.check == self.number else self.number
+        state = replace(state, model=replace(state.model, check=number))
+        judged = derived.truth(state)
+        if judged is not None and 0 <= number < len(judged.checks) and len(judged.checks[number].where):
+            look_at(bench, judged.checks[number].where, self.client)
+        return state
+
+
+def look_at(bench: Any, points: NDArray, client: int | None) -> None:
+    """Cameras go to where they see points (n, 3) [m]."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, size = (low + high) / 2.0, max(float(np.linalg.norm(high - low)), 0.05)
+    bench.look(middle + DISTANCES * size * AWAY / np.linalg.norm(AWAY), middle, client)

@@ -1,0 +1,147 @@
+"""The Part tab as HTML: the model in numbers, what is wrong with it, its history, and the library's thumbnails."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from handey_studio.app import html, palette
+from handey_studio.app.modelling import derived
+from handey_studio.app.palette import RESIDUAL, RESIDUAL_AT, css
+from handey_studio.app.scene.modelling.scans import distance_limit
+from handey_studio.app.state import State
+from handey_studio.app.svg_thumbnail import part_thumbnail
+from handey_studio.base import measured
+from handey_studio.geometry import Polyhedron
+from handey_studio.modeling.replay import Step
+from handey_studio.modeling.truth_values import Check, Truth
+from handey_studio.session.model_look import assumed_faces
+from handey_studio.world import Part
+
+TOLD_THROUGH = 0.005
+CARD = "cursor:pointer;border:1px solid;border-radius:6px;padding:4px"
+CLIPPED = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
+
+
+def numbers_html(state: State) -> str:
+    """Size, volume, mass, centre of mass, how well it agrees with the scans, what the hand can grasp of it."""
+    shown, judged, counted = derived.built(state), derived.truth(state), derived.grasps(state)
+    if shown is None or shown.solid is None:
+        return ""
+    rows = solid_facts(shown.solid, state.model.material.density)
+    assumed = len(assumed_faces(shown.sources))
+    rows.append(("Faces", f"{len(shown.solid.faces)}, {assumed} of them assumed" if assumed else f"{len(shown.solid.faces)}, none assumed"))
+    rows += truth_facts(judged)
+    if counted is not None:
+        words = (
+            f"{counted[0]} grasp classes, {counted[1]} approach groups" if counted[0] else "nothing: no two faces fit between its fingers"
+        )
+        rows.append(("The hand can grasp", words))
+    return html.facts(rows, "part-numbers")
+
+
+def solid_facts(solid: Polyhedron, density: float) -> list[tuple[str, str]]:
+    """What a solid measures [mm] along its own sides, and what it weighs."""
+    volume, centre = solid.volume_and_centroid
+    size = " × ".join(f"{1e3 * side:.1f}" for side in extents(solid))
+    return [
+        ("Size", f"{size} mm"),
+        ("Volume", f"{1e6 * volume:.2f} cm³"),
+        ("Mass", f"{1e3 * density * volume:.1f} g"),
+        ("Centre of mass", ", ".join(f"{1e3 * x:.1f}" for x in centre) + " mm"),
+    ]
+
+
+def extents(solid: Polyhedron) -> np.ndarray:
+    """Extents (3,) [m] along the longest level edge, level across it, and upright."""
+    ways = np.array([solid.vertices[edge.end] - solid.vertices[edge.start] for edge in solid.edges])
+    level = ways[np.abs(ways[:, 2]) < 1e-4 + 1e-3 * np.linalg.norm(ways, axis=1)]
+    x = level[int(np.argmax(np.linalg.norm(level, axis=1)))] if len(level) else np.array([1.0, 0.0, 0.0])
+    x = np.array([x[0], x[1], 0.0]) / np.hypot(x[0], x[1])
+    axes = np.stack([x, np.array([-x[1], x[0], 0.0]), np.array([0.0, 0.0, 1.0])])
+    return np.ptp(solid.vertices @ axes.T, axis=0)
+
+
+def truth_facts(judged: Truth | None) -> list[tuple[str, str]]:
+    """How the model agrees with its scans."""
+    if judged is None or not judged.scans or not np.isfinite(judged.rms):
+        return []
+    rows = [
+        ("Residual", f"{1e3 * judged.rms:.2f} mm rms"),
+        ("Explained", f"{100 * judged.explained:.0f} % of the readings, within 3 noises"),
+        ("Surface seen", f"{100 * judged.seen:.0f} %"),
+    ]
+    through = [scan for scan in judged.scans if scan.seen_through > 0.005]
+    rows += [
+        (f"Seen through in {scan.name}", f"{100 * scan.seen_through:.0f} %, {1e3 * scan.seen_through_m:.1f} mm deep") for scan in through
+    ]
+    return rows
+
+
+def legend_html(judged: Truth | None) -> str:
+    """What the colours of distances mean."""
+    if judged is None or not judged.scans:
+        return ""
+    stops = ", ".join(f"{css(colour)} {50 * (at + 1):.0f}%" for colour, at in zip(RESIDUAL, RESIDUAL_AT, strict=True))
+    limit = 1e3 * distance_limit([scan.noise for scan in judged.scans])
+    return html.scale("Readings' distance from the model (mm), behind to in front", stops, [f"−{limit:.1f}", "0", f"+{limit:.1f}"])
+
+
+def checks_html(checks: Sequence[Check], chosen: int, field: str) -> str:
+    """Each check with a tick, or a cross, its sentence and the fix; a click points at it in the scene."""
+    if not checks:
+        return ""
+    if all(check.ok for check in checks):
+        return html.card("A part", f"All {len(checks)} checks hold: closed, flat, one body, nowhere too thin.", "good", "checks")
+    rows = "".join(_check(number, check, number == chosen, field) for number, check in enumerate(checks) if not check.ok)
+    return f'<div data-testid="checks" style="margin:4px 12px;font-size:12px;line-height:1.35">{rows}</div>'
+
+
+def _check(number: int, check: Check, chosen: bool, field: str) -> str:
+    look = f"background:{css(palette.VERMILLION)}1c" if chosen else ""
+    return (
+        f'<div role="button" tabindex="0" data-testid="check-{number}" onclick="{html.esc(html.picking(field, str(number)))}" '
+        f'style="cursor:pointer;border-left:3px solid {css(palette.VERMILLION)};padding:3px 8px;margin-bottom:2px;{look}">'
+        f'✕ {html.esc(check.sentence)} <span style="color:#6b7684">{html.esc(check.fix)}</span></div>'
+    )
+
+
+def history_html(steps: Sequence[Step], looked_at: int | None, field: str) -> str:
+    """The steps with a tick, or the sentence why one fell; a click shows the model as after it."""
+    if not steps:
+        return html.empty("No step yet. Each one that you do is listed here; it can be looked at, changed and taken out.", "history-empty")
+    rows = "".join(_step(step, looked_at == step.number + 1, field) for step in steps)
+    return f'<div data-testid="history" style="margin:2px 12px 6px;font-size:12px;line-height:1.3">{rows}</div>'
+
+
+def _step(step: Step, chosen: bool, field: str) -> str:
+    colour, sign = (palette.VERMILLION, "✕") if step.reason else (palette.TEAL, "✓")
+    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:#e3e8ee"
+    words = f'<span style="flex:1;{CLIPPED}" title="{html.esc(step.told)}">{html.esc(step.told)}</span>'
+    why = f'<div style="color:{css(colour)};padding-left:34px;font-size:11.5px">{html.esc(step.reason)}</div>' if step.reason else ""
+    return (
+        f'<div data-testid="step-{step.number}" role="button" tabindex="0" aria-pressed="{str(chosen).lower()}" '
+        f'onclick="{html.esc(html.picking(field, str(step.number)))}" '
+        f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
+        f'<div style="display:flex;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span>'
+        f'<span style="color:#8a94a0;width:16px">{step.number + 1}</span>{words}</div>{why}</div>'
+    )
+
+
+def library_html(parts: Sequence[Part], chosen: str, drafts: Sequence[str], field: str) -> str:
+    """The library's parts as thumbnails; a click picks one. Those that have their history are marked."""
+    if not parts:
+        return html.empty("The library has no parts yet.", "library-empty")
+    cards = "".join(_thumbnail(number, part, part.name == chosen, part.name in drafts, field) for number, part in enumerate(parts))
+    return f'<div data-testid="library" style="display:grid;grid-template-columns:repeat(3,1fr);gap:6px;margin:4px 12px">{cards}</div>'
+
+
+def _thumbnail(number: int, part: Part, chosen: bool, has_draft: bool, field: str) -> str:
+    blue = css(palette.BLUE)
+    look = f"border-color:{blue};background:{blue}14" if chosen else "border-color:#dde2e8;background:#fbfcfd"
+    size = " × ".join(measured(float(side), "m").removesuffix(" mm") for side in np.ptp(part.solid.vertices, axis=0))
+    return (
+        f'<div data-testid="part-{html.esc(part.name)}" role="button" tabindex="0" title="{html.esc(f"{part.name}: {size} mm")}" '
+        f'onclick="{html.esc(html.picking(field, str(number)))}" style="{CARD};{look}">'
+        f'<div style="height:64px">{part_thumbnail(part)}</div>'
+        f'<div style="font-size:11.5px;text-align:center;{CLIPPED}">{html.esc(part.name)}{" ✎" if has_draft else ""}</div></div>'
+    )
