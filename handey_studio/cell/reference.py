@@ -38,7 +38,7 @@ def course(motion: Trajectory, q_start: NDArray, dt: float) -> Course:
     if len(times) == 1:
         places = np.repeat(q, len(at), axis=0), np.zeros((len(at), q.shape[1])), np.zeros((len(at), q.shape[1]))
     else:
-        smooth = CubicHermiteSpline(times, q, np.gradient(q, times, axis=0) if len(times) > 2 else np.zeros_like(q))
+        smooth = CubicHermiteSpline(times, q, np.gradient(q, times, axis=0, edge_order=2) if len(times) > 2 else np.zeros_like(q))
         places = tuple(np.where(at[:, None] > times[-1], end, smooth(at, k)) for k, end in enumerate((q[-1], 0.0, 0.0)))
     openings = np.interp(at, times, opening)
     lead = _lead(at) * (q_start - q[0])

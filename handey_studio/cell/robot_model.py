@@ -14,6 +14,7 @@ from handey_studio.world.robot import FINGERS, Hand
 ARMATURE = 0.1  # kg m², what a geared motor's rotor adds at its joint
 FINGER_ARMATURE_KG = 2.0  # what the fingers' spindle adds: it hardly gives way
 HAND_DENSITY = 1500.0  # kg/m³ of the hand's boxes: aluminium, in part hollow
+JAMMED = {"solref_friction": [0.004, 1.0], "solimp_friction": [0.9999, 0.9999, 0.001, 0.5, 2.0]}  # a joint that is jammed does not creep
 LEAST_MASS_KG, LEAST_INERTIA = 0.01, 1e-5  # of links for which the URDF gives none
 SIDES = {"finger_left": -1.0, "finger_right": 1.0}
 
@@ -26,7 +27,7 @@ def add_robot(spec: Any, arm: Arm) -> None:
     for i in range(1, arm.n + 1):
         T = arm.T_links[i - 1]
         node = node.add_body(name=f"link{i}", pos=T[:3, 3], quat=to_wxyz(T), **_inertia(arm, i))
-        node.add_joint(name=f"joint{i}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=arm.axes[i - 1], armature=ARMATURE)
+        node.add_joint(name=f"joint{i}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=arm.axes[i - 1], armature=ARMATURE, **JAMMED)
         _add_link_pieces(spec, node, arm, i)
     _add_hand(spec, node, arm)
 
@@ -66,6 +67,7 @@ def _add_hand(spec: Any, last: Any, arm: Arm) -> None:
             armature=FINGER_ARMATURE_KG,
             range=_reach(hand),
             limited=True,
+            **JAMMED,
         )
         add_piece(spec, finger, name, corners, Touching(FINGER_BIT, density=HAND_DENSITY))
     spec.add_equality(

@@ -40,11 +40,11 @@ class SimulatedDriver(Simulation):
         return np.sum([np.zeros(3), *(fault.vector for _, fault in self._clock.on(self._now) if fault.kind == "bias")], axis=0)
 
     def wait_for_rest(self, to: Reference, fingers: Drive) -> None:
-        """Hold the arm until the bodies are at rest."""
+        """Hold the arm until the bodies are at rest, one tick at least."""
         for _ in range(int(CALM_S / self.dt)):
+            self.tick(to, fingers)
             if self.calm(CALM_SPEED, CALM_TURN):
                 return
-            self.tick(to, fingers)
 
     def _switch(self, number: int, fault: Fault, on: bool) -> None:
         """A fault begins or ends."""

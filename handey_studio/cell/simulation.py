@@ -59,7 +59,7 @@ class Simulation:
         """Put arm and fingers somewhere at rest, the fingers closing with a force."""
         self.data.qpos[self._q_at], self.data.qpos[self._finger_at] = q, opening / 2
         self.data.qvel[:] = 0.0
-        self._integral = -grip_N
+        self._integral, self.finger_force = -grip_N, grip_N
         mujoco.mj_forward(self.model, self.data)
 
     def step(self, to: Reference, fingers: Drive) -> None:
@@ -172,11 +172,9 @@ class Simulation:
 
     def rub(self, name: str, share: float) -> None:
         """The friction between the fingers and a body becomes a share of its own."""
-        number = next(k for k, body in enumerate(self.bodies) if body.name == name)
-        own = _pad_friction(self._arm, self.bodies[number])
-        for k in range(self.model.npair):
-            if self.model.geom_bodyid[self.model.pair_geom2[k]] == self.model.body(f"body{number}").id:
-                self.model.pair_friction[k] = np.array(own) * share
+        own = _pad_friction(self._arm, next(body for body in self.bodies if body.name == name))
+        owners = self.model.geom_bodyid[np.array([self.model.pair_geom1, self.model.pair_geom2])]
+        self.model.pair_friction[(owners == self._free[name].id).any(axis=0)] = np.array(own) * share
 
     def push(self, name: str, force: NDArray) -> None:
         """A force (3,) [N] acts on a free body's centre until it is set anew."""
