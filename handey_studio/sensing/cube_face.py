@@ -1,7 +1,7 @@
 """The upper face of the calibration cube in a depth map (Handey 1987 §6): its plane, and its middle to a fraction of a cell."""
 
 from dataclasses import dataclass
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,9 @@ from handey_studio.sensing.depth_map import DepthMap
 SMOOTH_SIGMAS, SMOOTHEST_M = 6.0, 0.001  # neighbours that differ by no more are of one surface
 ON_SIGMAS, NEAREST_M = 5.0, 0.001  # readings so near to the face's plane are on it
 RIM_CELLS = 2  # the rim's cells have neighbours that are not of the face
-AREA_SHARE = 0.1  # by which a face's area may differ from the cube's, where each side counts cells that it only touches
-SQUARE_SHARE = 0.12  # the like for its second moments: a face that is half hidden, or no square, has others
+FITS, NEAR_CELLS = 8, (3.0, 1.2)  # rounds of the outline's fit; rim cells farther off a side are hidden by something: at first, at last
+SIZE_CELLS = 1.5  # by which a side may differ from the cube's
+RIM_SHARE, SIDE_SHARE = 0.75, 0.4  # of all rim cells, and of a side's length, that must lie on the outline
 LEVEL_RAD = np.deg2rad(10.0)
 
 
@@ -22,8 +23,8 @@ LEVEL_RAD = np.deg2rad(10.0)
 class CubeFace(Value):
     """The cube's upper face, or why it was not found.
 
-    `middle_range` (3,) [m] is the centroid of its outline, on its plane; `normal_range` (3,) points up; `rms_m` is how far its readings
-    are off the plane, `area_m2` what they cover.
+    `middle_range` (3,) [m] is the middle of the square outline, on its plane; `normal_range` (3,) points up; `rms_m` is how far readings
+    are off it, `area_m2` what they cover.
     """
 
     found: bool
@@ -71,12 +72,13 @@ def _face(depth_map: DepthMap, core: NDArray, side: float) -> CubeFace:
     with np.errstate(invalid="ignore"):
         on = ndimage.binary_dilation(core, iterations=RIM_CELLS) & (np.abs(off) <= max(ON_SIGMAS * depth_map.noise, NEAREST_M))
     whole = np.asarray(ndimage.binary_fill_holes(on))
-    v, u = np.nonzero(whole)
-    xy = np.stack([(u + 0.5) * cell, (v + 0.5) * cell], axis=1)
-    middle, normal = xy.mean(axis=0), np.array([-plane[1], -plane[2], 1.0]) / np.sqrt(1.0 + plane[1] ** 2 + plane[2] ** 2)
+    normal = np.array([-plane[1], -plane[2], 1.0]) / np.sqrt(1.0 + plane[1] ** 2 + plane[2] ** 2)
+    rim = np.argwhere(whole & np.logical_not(ndimage.binary_erosion(whole)))[:, ::-1] + 0.5
+    square = _square(rim, np.argwhere(whole)[:, ::-1].mean(axis=0) + 0.5, side / cell)
+    middle = square.middle * cell
     height = plane[0] + plane[1:] @ (middle - 0.5 * cell)
-    rms, area = float(np.sqrt(np.mean(off[on] ** 2))), len(xy) * cell**2 / float(normal[2])
-    reason = _unfit(whole, xy, area, normal, side)
+    reason = _unfit(whole, square, normal, side / cell)
+    rms, area = float(np.sqrt(np.mean(off[on] ** 2))), int(whole.sum()) * cell**2 / float(normal[2])
     return CubeFace(not reason, reason, np.append(middle, height), normal, rms, area)
 
 
@@ -86,18 +88,54 @@ def _plane(cell: float, z: NDArray, mask: NDArray) -> NDArray:
     return np.linalg.lstsq(np.stack([np.ones(len(i)), i * cell, j * cell], axis=1), z[j, i], rcond=None)[0]
 
 
-def _unfit(whole: NDArray, xy: NDArray, area: float, normal: NDArray, side: float) -> str:
-    """Why a surface is not the cube's whole face; empty when it is."""
+class _Square(NamedTuple):
+    """An outline in cells: its middle (2,), its side, the share of the rim's cells that lie on it, and the least covered side's share."""
+
+    middle: NDArray
+    side: float
+    rim_share: float
+    side_share: float
+
+
+def _square(rim: NDArray, middle: NDArray, side: float) -> _Square:
+    """The square that most of the rim's cells (n, 2) lie on, by least squares: place, turn and size. Cells off it are hidden ones' doing.
+
+    The turn begins where the rim's fourth harmonic has it: a square has its corners in these directions.
+    """
+    arms = (rim - middle) @ np.array([1.0, 1.0j])
+    turn, half = float(np.angle(-(arms**4).sum()) / 4.0), side / 2
+    for k in range(FITS):
+        local = (rim - middle) @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        axis = np.abs(local).argmax(axis=1)
+        across, along = local[np.arange(len(rim)), axis], local[np.arange(len(rim)), 1 - axis]
+        sign = np.sign(across)
+        off = np.abs(across) - half
+        near = np.abs(off) < np.interp(k, (0, FITS - 1), NEAR_CELLS)
+        if near.sum() < 8:
+            break
+        columns = np.stack(
+            [sign * (axis == 0), sign * (axis == 1), sign * along * np.where(axis == 0, -1.0, 1.0), np.ones(len(rim))], axis=1
+        )
+        step = np.linalg.lstsq(columns[near], off[near], rcond=None)[0]
+        c, s = np.cos(turn), np.sin(turn)
+        middle, half = middle + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1]]), half + step[3]
+        turn += step[2]
+    covered = [np.unique(np.round(along[near & (axis == a) & (sign == way)])).size for a in (0, 1) for way in (-1.0, 1.0)]
+    return _Square(middle, 2 * half + 1.0, float(near.mean()), min(covered) / side)
+
+
+def _unfit(whole: NDArray, square: _Square, normal: NDArray, side: float) -> str:
+    """Why a surface is not the cube's face, seen well enough; empty when it is."""
     if whole[[0, -1]].any() or whole[:, [0, -1]].any():
         return "the face leaves the depth map"
     tilt = float(np.arccos(normal[2]))
     if tilt > LEVEL_RAD:
         return f"the face leans by {np.rad2deg(tilt):.1f}°, limit {np.rad2deg(LEVEL_RAD):.0f}°"
-    if abs(area / side**2 - 1.0) > AREA_SHARE:
-        return f"the face covers {1e6 * area:.0f} mm², the cube's has {1e6 * side**2:.0f} ± {100 * AREA_SHARE:.0f} %; something may hide it"
-    moments = np.linalg.eigvalsh(np.cov(xy.T)) / (side**2 / 12.0)
-    if np.abs(moments - 1.0).max() > SQUARE_SHARE:
-        return f"the face is no square of {1e3 * side:.0f} mm: its sides are as {np.sqrt(moments[0]):.2f} to {np.sqrt(moments[1]):.2f}"
+    if abs(square.side - side) > SIZE_CELLS:
+        return f"the face has sides of {square.side:.1f} cells, the cube's have {side:.1f} ± {SIZE_CELLS}"
+    if square.rim_share < RIM_SHARE or square.side_share < SIDE_SHARE:
+        seen = f"{100 * square.rim_share:.0f} % of its rim, {100 * square.side_share:.0f} % of the side that is seen least"
+        return f"the face is no square or half hidden: only {seen} lie on its outline"
     return ""
 
 
