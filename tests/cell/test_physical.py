@@ -56,9 +56,8 @@ class Hands:
     def go(self, T_world_hand, opening: float = 0.06):
         """By the joints, as quick as the robot's limits allow; the hand looks the same with its fingers swapped."""
         now = self.cell.joints()
-        return self._to(
-            min((self.arms.at(T_world_hand @ turn, now) for turn in (np.eye(4), TURNED)), key=lambda q: np.abs(q - now).max()), opening
-        )
+        ways = [self.arms.at(T_world_hand @ turn, now) for turn in (np.eye(4), TURNED)]
+        return self._to(min(ways, key=lambda q: np.abs(q - now).max()), opening)
 
     def _to(self, q, opening: float):
         way = PathResult("found", "", np.array([self.cell.joints(), q]))
@@ -256,7 +255,7 @@ def test_a_jammed_joint_blocks_the_arm(library, robot):
 
 
 def test_it_refuses_what_an_arm_would_refuse(hands):
-    with pytest.raises(CannotAct, match="starts 0.100 rad"):
+    with pytest.raises(CannotAct, match=r"starts 0\.100 rad"):
         hands.cell.follow(gentle([AHEAD + 0.1, AHEAD], 1.0, 0.09))
     with pytest.raises(CannotAct, match="hand opens"):
         hands.cell.grip(0.2)
