@@ -26,6 +26,7 @@ from handey_studio.app.scene.findings import PlanScene
 from handey_studio.app.scene.grasp import GraspScene, StandingScene
 from handey_studio.app.scene.hypothesis import HypothesisScene
 from handey_studio.app.scene.modelling.clicks import ClickScenes
+from handey_studio.app.scene.modelling.gizmo import GizmoScene
 from handey_studio.app.scene.modelling.scans import ScanScene
 from handey_studio.app.scene.modelling.solid import SolidScene
 from handey_studio.app.scene.pair import PairScene
@@ -61,7 +62,7 @@ class View:
         scenes += [CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
         session = SessionPanel(server, send)
         self._of_move: list[Pane] = scenes
-        models: list[Pane] = [ScanScene(server), SolidScene(server), ClickScenes(server, send)]
+        models: list[Pane] = [ScanScene(server), SolidScene(server), ClickScenes(server, send), GizmoScene(server, send)]
         self._panes: list[Pane] = [*models, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(RIGHT_WIDTH)

@@ -16,6 +16,7 @@ from handey_studio.app.commands import CameraMoved, Tell, Viewers
 from handey_studio.app.explaining import Explainer
 from handey_studio.app.handling import Handler
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows
+from handey_studio.app.modelling.showing import turn_to_model
 from handey_studio.app.modelling.workers import modelling_workers
 from handey_studio.app.palette import BLUE, TEAL, VERMILLION
 from handey_studio.app.planner import Failed, Finished, Planner, Progressed, Run, Shown
@@ -47,6 +48,7 @@ class Workbench:
         self.state: State = opened(library, session, path)
         self._commands: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._camera: CameraMoved | None = None
+        self._before = session.view
         self._running = threading.Event()
         self._running.set()
         self.planner = Planner(run, lambda message: self.send(heard(message)), prepare)
@@ -124,6 +126,7 @@ class Workbench:
         for command in commands:
             self.state = self._next(command)
         self._view.render(old, self.state)
+        self._turn(old)
         self._follow()
         self._notify(old)
 
@@ -132,6 +135,19 @@ class Workbench:
             return command.run(self) if hasattr(command, "run") else command.apply(self.state)
         except BadInput as error:
             return self.state.told(str(error), "bad")
+
+    def _turn(self, old: State) -> None:
+        """When the model is opened or closed, its tab or that of the MOVE comes to the front, and the cameras go there or back."""
+        new = self.state
+        if old.model.open == new.model.open:
+            return
+        for client in self.server.get_clients().values():
+            show_tab(client, "Model" if new.model.open else "Move")
+        if new.model.open:
+            self._before = old.session.view
+            turn_to_model(self)
+        else:
+            self.look(self._before.camera_position, self._before.camera_look_at, None)
 
     def _follow(self) -> None:
         """What the state wants worked out is worked out in the background."""

@@ -30,7 +30,7 @@ class Accept:
 
 @dataclass(frozen=True)
 class Escape:
-    """A job is stopped; else the tool is put down; else nothing is selected."""
+    """A job is stopped; else the scan in which the model was looked for goes; else the tool is put down; else nothing is selected."""
 
     def run(self, bench: Bench) -> State:
         state = bench.state
@@ -38,6 +38,8 @@ class Escape:
             return CancelMove().run(bench)
         if not state.model.open:
             return state
+        if state.model.trial is not None:
+            return replace(state, model=replace(state.model, trial=None))
         if state.model.clicks or state.model.drawing is not None:
             return replace(state, model=replace(state.model, clicks=(), drawing=None))
         return ChooseTool(SELECT).apply(replace(state, model=replace(state.model, step=None, check=-1)))

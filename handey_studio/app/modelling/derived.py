@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from handey_studio.app.modelling.look import Worked
 from handey_studio.app.state import State, same
+from handey_studio.localization import LocateResult
 from handey_studio.modeling.draft import Draft
 from handey_studio.modeling.operations import AlignScan, Operation, TakeSuggestion
 from handey_studio.modeling.patches import Patches
@@ -17,7 +18,7 @@ from handey_studio.modeling.suggestion import Alignment, Suggestion
 from handey_studio.modeling.truth_values import Truth
 from handey_studio.session.model_look import built_of, clickable, shown_poses, unaligned
 
-SUGGESTION, ALIGNMENT, TRUTH, GRASPS = "suggestion", "alignment", "truth", "grasps"
+SUGGESTION, ALIGNMENT, TRUTH, GRASPS, TRIAL = "suggestion", "alignment", "truth", "grasps", "trial"
 
 
 def draft_of(state: State) -> Draft | None:
@@ -133,6 +134,17 @@ def to_grasp(state: State) -> tuple | None:
 def grasps(state: State) -> tuple[int, int] | None:
     """How many grasp classes and approach groups the hand has for the solid."""
     return outcome(state, GRASPS, to_grasp(state))
+
+
+def to_try(state: State) -> tuple | None:
+    """The scan in which the solid is to be looked for."""
+    shown = built(state)
+    return None if state.model.trial is None or shown is None or shown.solid is None else (state.model.trial, shown.solid)
+
+
+def tried(state: State) -> LocateResult | None:
+    """Where the solid was found in that scan."""
+    return outcome(state, TRIAL, to_try(state))
 
 
 def scan_poses(state: State) -> tuple[NDArray, ...]:

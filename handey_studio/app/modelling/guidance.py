@@ -2,8 +2,10 @@
 
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE
-from handey_studio.app.modelling.tools import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH, tool_plane
+from handey_studio.app.modelling.tools import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH, measurement, tool_plane
 from handey_studio.app.state import State
+from handey_studio.base import measured
+from handey_studio.modeling.scans import Scan
 from handey_studio.session.model_look import assumed_faces, proposals, unaligned
 
 BOX_CLICKS = ("a corner of the box's upper face", "the next corner along a side of it", "a point on the side across")
@@ -21,6 +23,8 @@ def model_step(state: State) -> tuple[str, str, str]:
         return "One more file", f'Upload the {wanted} that belongs to "{state.model.waiting.name}".', "info"
     if draft is None:
         return "Model a part", "Scan the cell or upload a scan of an object: its faces are found, and a solid is suggested.", "info"
+    if state.model.trial is not None:
+        return _about_trial(state, state.model.trial)
     if state.model.tool != SELECT:
         return tool_step(state)
     return _with_scans(state) if derived.to_segment(state) is None else ("Looking for planar faces …", "In the new scan.", "info")
@@ -45,6 +49,21 @@ def _with_scans(state: State) -> tuple[str, str, str]:
     if state.model.step is not None:
         return f"As after step {state.model.step}", "Click the step again to see the whole model.", "quiet"
     return _about_solid(state)
+
+
+def _about_trial(state: State, scan: Scan) -> tuple[str, str, str]:
+    """Whether the model was found in another scan."""
+    found = derived.tried(state)
+    if found is None:
+        failed = derived.is_worked(state, derived.TRIAL, derived.to_try(state))
+        words = "The localizer failed; the log tells why." if failed else f'In "{scan.source}", by its edges and surfaces.'
+        return "Looking for the model …", words, "bad" if failed else "info"
+    if not found.poses:
+        return "Not found there", f"{found.reason} Esc goes back to the model.", "bad"
+    best = found.poses[0]
+    times = f"{len(found.poses)} times, best" if len(found.poses) > 1 else "once,"
+    words = f"{times} with a probability of {100 * best.score:.0f} % and {1e3 * best.surface_rms_m:.1f} mm rms. Esc goes back to the model."
+    return "Found there", words[0].upper() + words[1:], "good"
 
 
 def _about_alignment(state: State, name: str) -> tuple[str, str, str]:
@@ -101,6 +120,13 @@ def tool_step(state: State) -> tuple[str, str, str]:
             return title, "Move the plane by its offset, turn it round, then press the button (Enter).", "info"
         left = f"; {3 - len(clicks)} more points" if clicks else ""
         return title, f"Click a face whose plane is meant, or three points of a plane{left}.", "info"
+    told = measurement(state)
+    if told is not None:
+        return (
+            measured(told.value, told.unit),
+            f"{told.sentence[0].upper()}{told.sentence[1:]}. Click again to measure something else.",
+            "good",
+        )
     if tool == MEASURE:
         return "Measure", "Click the second thing." if len(clicks) == 1 else "Click two things: corners, edges, faces or readings.", "info"
     if tool == POINTS:

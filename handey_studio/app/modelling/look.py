@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handey_studio.geometry import Polyhedron
 from handey_studio.modeling.operations import Combine
 from handey_studio.modeling.references import FaceAt
 from handey_studio.modeling.scans import Scan
@@ -67,36 +68,30 @@ class Worked:
 
 @dataclass(frozen=True, eq=False)
 class ModelLook:
-    """How the model is looked at. `open`: the scene shows the model, not the MOVE.
+    """How the model is looked at, and what a person is doing with it. All lengths [m], in the model's frame."""
 
-    `clicks` and `drawing` are what the active `tool` has so far, `picked` what is selected. `object_at` (scan, u, v) is the pixel at
-    which an object was clicked that a model is wanted of. `step`: the model is shown as after that many steps, None for all of them.
-    Of a new scan `new_object` is the number of the object that is aligned, by picked `pairs` of points if there are three: in the model's
-    frame and in the scan's world (3,) [m]; `alternative` counts the poses that fit. `check` is the check that is pointed at, `part` the
-    library's part that is. In the scan `trial` the model is looked for. `waiting` and `reading` are uploads under way, `saves` counts
-    parts that were kept. `eye` (3,) [m] is where the last click came from. `worked` keeps what was worked out in the background, by name.
-    """
-
-    open: bool = False
+    open: bool = False  # the scene shows the model, not the MOVE
     tool: str = SELECT
-    clicks: tuple[Snap, ...] = ()
+    clicks: tuple[Snap, ...] = ()  # what the tool has so far
     drawing: Drawing | None = None
-    picked: tuple[Snap, ...] = ()
+    picked: tuple[Snap, ...] = ()  # what is selected
     settings: ToolSettings = ToolSettings()
     material: Material = Material()
-    object_at: tuple[int, float, float] | None = None
-    new_object: int = 0
-    pairs: tuple[tuple[NDArray, NDArray], ...] = ()
-    step: int | None = None
-    alternative: int = 0
-    check: int = -1
+    object_at: tuple[int, float, float] | None = None  # scan, u, v: the pixel of the object that a model is wanted of
+    new_object: int = 0  # of a new scan, the number of the object that is aligned
+    pairs: tuple[tuple[NDArray, NDArray], ...] = ()  # points (3,) picked for that, in the model's frame and in the scan's world
+    alternative: int = 0  # which of the poses that fit
+    step: int | None = None  # the model is shown as after so many steps, None for all of them
+    check: int = -1  # the check that is pointed at
     colours: str = BY_SCAN
-    unit: str = "m"
-    part: str = ""
-    saves: int = 0
+    unit: str = "m"  # of clouds that are uploaded
     waiting: Waiting | None = None
     reading: Upload | None = None
-    trial: Scan | None = None
-    eye: NDArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    patches: tuple[Worked, ...] = ()
-    worked: tuple[tuple[str, Worked], ...] = ()
+    trial: Scan | None = None  # the scan in which the model is looked for
+    part: str = ""  # the part of the library that is pointed at
+    saves: int = 0  # how often a part was kept, so that the library is read again
+    preview: Polyhedron | None = None  # the solid as it would be after the drag that is under way
+    drags: int = 0
+    eye: NDArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  # where the last click came from
+    patches: tuple[Worked, ...] = ()  # the planar faces of scans
+    worked: tuple[tuple[str, Worked], ...] = ()  # what else the background worked out, by its name

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from handey_studio.app.modelling import derived
 from handey_studio.app.state import State
+from handey_studio.modeling.patches import Patches
 
 AWAY = np.array([0.42, -0.80, 0.72])  # from the front, the side and above
 DISTANCES = 3.0  # extents of an object from which one looks at it
@@ -38,6 +39,22 @@ class PointAtCheck:
         if judged is not None and 0 <= number < len(judged.checks) and len(judged.checks[number].where):
             look_at(bench, judged.checks[number].where, self.client)
         return state
+
+
+def turn_to_model(bench: Any) -> None:
+    """Cameras go to the solid, or to the largest object of the first scan; they stay where they are while there is neither."""
+    shown, patches = derived.built(bench.state), derived.found_patches(bench.state)
+    if shown is not None and shown.solid is not None:
+        look_at(bench, shown.solid.vertices, None)
+    elif patches and patches[0] is not None:
+        look_at_object(bench, patches[0])
+
+
+def look_at_object(bench: Any, found: Patches) -> None:
+    """Cameras go to the largest object that a scan shows, down to its support."""
+    rings = [ring for number in found.objects[0] for ring in found.patches[number].rings] if found.objects else []
+    if rings:
+        look_at(bench, np.concatenate([*rings, *(ring * (1.0, 1.0, 0.0) for ring in rings)]), None)
 
 
 def look_at(bench: Any, points: NDArray, client: int | None) -> None:

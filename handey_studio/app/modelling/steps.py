@@ -23,6 +23,7 @@ from handey_studio.modeling.operations import (
     SetLength,
 )
 from handey_studio.modeling.references import CornerAt, EdgeAt, FaceAt
+from handey_studio.modeling.replay import replay
 from handey_studio.modeling.taking import take, take_alignment
 from handey_studio.session.model_look import proposals, unaligned
 from handey_studio.session.step_numbers import with_number
@@ -90,12 +91,26 @@ class MovePickedBy:
     way: NDArray
 
     def apply(self, state: State) -> State:
-        reference = _reference(state)
-        if isinstance(reference, FaceAt):
-            return MovePicked(float(reference.normal @ self.way)).apply(state)
-        if isinstance(reference, EdgeAt):
-            return operated(state, MoveEdge(reference, self.way))
-        return operated(state, MoveCorner(_picked(state, CornerAt, "a corner"), self.way))
+        state = replace(state, model=replace(state.model, preview=None, drags=state.model.drags + 1))
+        step = _moving(state, self.way)
+        try:
+            return operated(state, step)
+        except BadInput as error:  # the arrow goes back to where it was
+            return state.told(str(error), "bad")
+
+
+@dataclass(frozen=True, eq=False)
+class PreviewMove:
+    """What is selected is being dragged by a way (3,) [m]: the model is shown as it would be, if it can be."""
+
+    way: NDArray
+
+    def apply(self, state: State) -> State:
+        draft = derived.draft_of(state)
+        if draft is None or not state.model.picked:
+            return state
+        longer = replace(draft, operations=(*draft.operations, _moving(state, self.way)))
+        return replace(state, model=replace(state.model, preview=replay(longer).solid))
 
 
 @dataclass(frozen=True)
@@ -185,6 +200,16 @@ def two_faces(state: State) -> tuple[FaceAt, FaceAt]:
     if not faces or other is None:
         raise BadInput("select a face that has one parallel to it, or two faces (Shift and click), first.")
     return faces[0], other
+
+
+def _moving(state: State, way: NDArray) -> Operation:
+    """The step that moves what is selected."""
+    reference = _reference(state)
+    if isinstance(reference, FaceAt):
+        return MoveFace(reference, float(reference.normal @ way))
+    if isinstance(reference, EdgeAt):
+        return MoveEdge(reference, way)
+    return MoveCorner(_picked(state, CornerAt, "a corner"), way)
 
 
 def _picked(state: State, kind: type[R], words: str) -> R:

@@ -12,11 +12,13 @@ from handey_studio.app.modelling.steps import operated
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import apply, inverse
+from handey_studio.modeling.measuring import Measurement, measure
 from handey_studio.modeling.operations import CutByPlane, Extrude, Mirror, Sketch
 from handey_studio.modeling.references import FaceAt
 from handey_studio.modeling.sketching import SketchOptions, clicked, closed
 from handey_studio.modeling.snap import MODEL, Ray, Snap, SnapOptions
 from handey_studio.modeling.snapping import pick
+from handey_studio.modeling.taking import reference_of
 from handey_studio.session.model_look import unaligned
 from handey_studio.session.strokes import box_of, guides_of, on_model, on_plane, pixel_of, plane_normal, plane_of, sketch_frame
 
@@ -248,6 +250,13 @@ def _plane_needed(state: State) -> tuple[NDArray, NDArray]:
 def _measure_clicked(state: State, snap: Snap) -> State:
     clicks = state.model.clicks
     return replace(state, model=replace(state.model, clicks=(snap,) if len(clicks) != 1 else (*clicks, snap)))
+
+
+def measurement(state: State) -> Measurement | None:
+    """What the measuring tool tells of its two clicks."""
+    if state.model.tool != MEASURE or len(state.model.clicks) != 2:
+        return None
+    return measure(*(reference_of(snap) for snap in state.model.clicks))
 
 
 def _check_apart(clicks: tuple[Snap, ...]) -> None:

@@ -4,18 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.app.background import Background
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import Worked
 from handey_studio.app.modelling.scanning import ScanRead
-from handey_studio.app.modelling.showing import look_at
+from handey_studio.app.modelling.showing import look_at_object
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron
 from handey_studio.grasping import grasp_classes, grasp_groups
+from handey_studio.localization import LocateResult, localize
 from handey_studio.modeling.align import align
 from handey_studio.modeling.patches import Patches
 from handey_studio.modeling.patches_finding import patches_of
@@ -28,6 +28,7 @@ from handey_studio.session.model_files import scan_of_upload
 from handey_studio.world import Part, Robot
 
 KEPT_PATCHES = 24
+MODEL_NAME = "model"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +41,8 @@ class Segmented:
         model = bench.state.model
         state = replace(bench.state, model=replace(model, patches=(*model.patches, self.worked)[-KEPT_PATCHES:]))
         draft, found = derived.draft_of(state), self.worked.outcome
-        if draft is not None and self.worked.asked[0] is draft.scans[0] and found is not None and found.objects:
-            rings = [ring for number in found.objects[0] for ring in found.patches[number].rings]
-            look_at(bench, np.concatenate([*rings, *(ring * (1.0, 1.0, 0.0) for ring in rings)]), None)
+        if draft is not None and draft.scans and self.worked.asked[0] is draft.scans[0] and found is not None:
+            look_at_object(bench, found)
         return state
 
 
@@ -68,6 +68,7 @@ def modelling_workers(send: Callable[[Any], None]) -> tuple[Background, ...]:
         _worker(send, derived.ALIGNMENT, derived.to_align, aligned),
         _worker(send, derived.SUGGESTION, derived.to_suggest, suggested),
         _worker(send, derived.TRUTH, derived.to_judge, judged),
+        _worker(send, derived.TRIAL, derived.to_try, located),
         _worker(send, derived.GRASPS, derived.to_grasp, counted_grasps),
     )
 
@@ -106,9 +107,14 @@ def judged(solid: Polyhedron, scans: tuple[Scan, ...], poses: tuple[tuple[str, N
     return truth(solid, aligned, tuple(known[scan.name] for scan in aligned))
 
 
+def located(scan: Scan, solid: Polyhedron) -> LocateResult:
+    """Where the localizer finds a solid in a scan."""
+    return localize(scan.view, (Part(MODEL_NAME, solid),))
+
+
 def counted_grasps(solid: Polyhedron, robot: Robot) -> tuple[int, int]:
     """How many grasp classes and approach groups a hand has for a solid."""
-    part = Part("model", solid)
+    part = Part(MODEL_NAME, solid)
     return len(grasp_classes(part, robot.hand)[0]), len(grasp_groups(part, robot.hand)[0])
 
 

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from handey_studio.app import palette
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import Drawing
-from handey_studio.app.modelling.tools import CUT, MEASURE, MIRROR, ClickScene, tool_plane
+from handey_studio.app.modelling.tools import CUT, MIRROR, ClickScene, measurement, tool_plane
 from handey_studio.app.scene.modelling.solid import face_corners
 from handey_studio.app.scene.units import metres, scaled
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_scene_click
+from handey_studio.base import measured
 from handey_studio.geometry.transforms import apply
 from handey_studio.modeling.sketch_plane import sketch_plane
 from handey_studio.modeling.snap import MODEL, Ray, Snap
@@ -44,8 +45,7 @@ class ClickScenes:
             self._add_drawing(new.model.drawing)
         self._add_sketches(new)
         self._add_plane(new)
-        if new.model.tool == MEASURE and len(new.model.clicks) == 2:
-            self._add_measure(new)
+        self._add_measure(new)
 
     def _add_snap(self, name: str, snap: Snap, state: State) -> None:
         self._dot(name, snap.point)
@@ -95,9 +95,10 @@ class ClickScenes:
         self._lines(f"{ROOT}/normal", np.array([[point, point + 0.02 * normal]]), palette.VERMILLION, 4.0)
 
     def _add_measure(self, state: State) -> None:
-        a, b = (snap.point for snap in state.model.clicks)
-        self._lines(f"{ROOT}/measure", np.array([[a, b]]), palette.VERMILLION, 3.0)
-        self._label(f"{ROOT}/measured", (a + b) / 2.0, f"{1e3 * float(np.linalg.norm(b - a)):.2f} mm")
+        told = measurement(state)
+        if told is not None:
+            self._lines(f"{ROOT}/measure", told.line[None], palette.VERMILLION, 3.0)
+            self._label(f"{ROOT}/measured", told.line.mean(axis=0), measured(told.value, told.unit))
 
     def _dot(self, name: str, point: NDArray) -> None:
         self._scene.add_icosphere(name, radius=float(scaled(DOT_M)), color=palette.BLUE, position=scaled(point), subdivisions=2)

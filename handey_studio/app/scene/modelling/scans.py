@@ -14,6 +14,7 @@ from handey_studio.app.scene.units import scaled
 from handey_studio.app.state import State
 from handey_studio.geometry.transforms import apply
 from handey_studio.modeling.patches import Patches
+from handey_studio.modeling.scans import Scan
 from handey_studio.session.model_look import ground_of, points_of, spacing_of
 
 ROOT = "/model/scans"
@@ -36,6 +37,9 @@ class ScanScene:
         draft = derived.draft_of(new)
         if draft is None:
             return
+        if new.model.trial is not None:
+            self._add_trial(new.model.trial)
+            return
         judged = derived.truth(new) if new.model.colours == BY_DISTANCE else None
         poses, patches = derived.scan_poses(new), derived.found_patches(new)
         for number, (scan, pose) in enumerate(zip(draft.scans, poses, strict=True)):
@@ -51,6 +55,12 @@ class ScanScene:
             for number, told in enumerate(judged.scans):
                 colours = residual_colours(told.distances / limit)
                 self._add_points(f"{ROOT}/{number}/distances", told.points, colours, spacing[told.name])
+
+    def _add_trial(self, scan: Scan) -> None:
+        """The scan in which the model is looked for, alone."""
+        colour, ground = (np.array(c, dtype=np.uint8) for c in (SCAN_COLOURS[0], palette.PALE))
+        self._add_points(f"{ROOT}/trial", points_of(scan, np.eye(4)), colour, spacing_of(scan))
+        self._add_points(f"{ROOT}/trial_ground", ground_of(scan), ground, spacing_of(scan))
 
     def _add_points(self, name: str, points: NDArray, colours: NDArray, spacing: float) -> None:
         step = max(1, len(points) // MAX_POINTS)
@@ -82,4 +92,5 @@ def _looks(state: State) -> tuple:
     draft = derived.draft_of(state)
     poses = tuple(pose.tobytes() for pose in derived.scan_poses(state))
     by_distance = id(derived.truth(state)) if state.model.colours == BY_DISTANCE else 0
-    return state.loads, id(draft.scans) if draft is not None else 0, poses, id(state.model.patches), by_distance
+    scans = id(draft.scans) if draft is not None else 0
+    return state.loads, scans, poses, id(state.model.patches), by_distance, id(state.model.trial)
