@@ -8,7 +8,7 @@ from scipy.ndimage import minimum_filter
 
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.modeling.patches import Patches
-from handey_studio.modeling.patches_outlines import lost_at_rims
+from handey_studio.modeling.patches_sides import lost_at_rims
 from handey_studio.modeling.scans import Scan
 from handey_studio.sensing.depth_view import DepthView
 

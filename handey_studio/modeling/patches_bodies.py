@@ -14,7 +14,7 @@ GAP_PX = 5  # readings of two patches so near in a row or column may be beside t
 NEAR_SIGMAS, NEAR_PX = 6.0, 3.0  # and so near in space, in deviations and pixels' sizes
 LEAST_READINGS = 5
 FULL_SIDE = 0.8  # of a patch's length: a rim along all of it
-LONG_CREASE = 8.0  # readings beside a crease by the root of the smaller patch's: patches of two bodies touch more shortly
+LONG_CREASE = 6.0  # readings beside a crease by the root of the smaller patch's: patches of two bodies touch more shortly
 
 
 def creases_of(view: DepthView, points: NDArray, labels: NDArray, planes: NDArray, sigma: NDArray) -> tuple[Crease, ...]:

@@ -10,7 +10,8 @@ from handey_studio.geometry.transforms import apply
 from handey_studio.modeling.patches import Border, Crease, Patch, Patches
 from handey_studio.modeling.patches_bodies import bodies_of, creases_of
 from handey_studio.modeling.patches_growing import Camera, grown, normals_of, planes_of
-from handey_studio.modeling.patches_outlines import SUPPORT, Seen, area_of, lost_at_rims, outlines_of
+from handey_studio.modeling.patches_outlines import area_of, outlines_of
+from handey_studio.modeling.patches_sides import SUPPORT, Seen, lost_at_rims
 from handey_studio.modeling.patches_windows import Field, field_of
 from handey_studio.modeling.scans import Scan
 from handey_studio.sensing.depth_view import DepthView, Pinhole

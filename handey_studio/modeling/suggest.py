@@ -11,7 +11,7 @@ from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.modeling.patches import Patches
 from handey_studio.modeling.patches_finding import patch_at, patches_of
-from handey_studio.modeling.patches_outlines import lost_at_rims
+from handey_studio.modeling.patches_sides import lost_at_rims
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.suggest_fit import Fit, Rays, fit_of, rays_of
 from handey_studio.modeling.suggest_planes import Body, BodyPlane, Squared, body_planes

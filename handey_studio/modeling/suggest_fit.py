@@ -9,7 +9,7 @@ from scipy.ndimage import binary_erosion
 
 from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import apply, inverse, rotate
-from handey_studio.modeling.patches_outlines import lost_at_rims
+from handey_studio.modeling.patches_sides import lost_at_rims
 from handey_studio.modeling.scans import Scan
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.sensing.facets import sigma_at

@@ -25,6 +25,7 @@ SHORT_SIGMAS, SHORT_PX_M = 3.0, 0.004  # shorter sides of an outline are the sen
 INTO_M = 0.001  # columns reach into higher ones beside them
 NEAR_STEP_M = 0.006  # so near to where a higher face hides the lower one its side goes down
 MOST_ENDS = 3
+LEAST_APART_M = 0.0003  # corners of an outline
 EXACT_DIGITS = 7  # a ten thousandth of a millimetre
 
 
@@ -234,7 +235,7 @@ def _mean(one: Line, other: Line) -> Line:
 
 
 def _corners(lines: list[Line]) -> NDArray | None:
-    """Where neighbouring sides meet (n, 2); None where they do not."""
+    """Where neighbouring sides meet (n, 2); None where they do not, or a side has no length."""
     corners = []
     for k in range(len(lines)):
         one, two = lines[k - 1], lines[k]
@@ -242,7 +243,8 @@ def _corners(lines: list[Line]) -> NDArray | None:
         if abs(cross) < 0.05:
             return None
         corners.append(np.linalg.solve(np.stack([one.outward, two.outward]), [one.offset, two.offset]))
-    return np.array(corners)
+    apart = np.linalg.norm(np.array(corners) - np.roll(corners, 1, axis=0), axis=1)
+    return np.array(corners) if apart.min() > LEAST_APART_M else None
 
 
 def _polygon(rings: list[list[Line]]) -> shapely.Polygon | None:
