@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from handey_studio.base import BadInput, Entry, Ledger, Progress, Share, Silent, Value, frozen_array
 from handey_studio.cell.protocol import CannotAct, Cell
 from handey_studio.geometry import box
-from handey_studio.geometry.transforms import apply, transform
+from handey_studio.geometry.transforms import apply, inverse, rotate, transform
 from handey_studio.motion import PathResult, plan_path, plan_reach, time_path
 from handey_studio.sensing.cube_face import CubeFace, find_cube_face
 from handey_studio.sensing.frame_fit import FitOptions, FrameFit, fit_frame
@@ -93,12 +93,13 @@ def calibrate_range(
 ) -> RangeCalibration:
     """Show the cube, which is in the hand, at several poses and fit the range finder's frame. The arm comes home in the end.
 
-    Nothing is believed of where the range finder stands, but within `SPARE_M` and a few degrees: what it sees on the table counts as
+    Scans may come from any sensor that makes depth maps: what they say is taken into the frame of `workcell.finder`, and that is fitted.
+    Nothing is believed of where it stands, but within `SPARE_M` and a few degrees: what it sees on the table counts as
     standing everywhere around, as high as its highest reading. A pose that is not reached or not seen is told, and another taken.
     """
     before, ledger = station.workcell.finder.T_world_range, Ledger()
     try:
-        table, standing = _look(cell, station.workcell.table_z)
+        table, standing = _look(cell, before, station.workcell.table_z)
         session = _Showman(station, cell, options, _world(station, standing), table, standing.top, ledger, [])
         session.show_all(Share(progress, 0.05, 0.95))
         session.come_home(Share(progress, 0.95, 1.0))
@@ -115,21 +116,22 @@ class _Standing(NamedTuple):
     high: NDArray
 
 
-def _look(cell: Cell, table_z: float) -> tuple[TablePoint, _Standing]:
-    """A point of the table, and what stands on it, from a scan with the arm at home."""
+def _look(cell: Cell, T_world_range: NDArray, table_z: float) -> tuple[TablePoint, _Standing]:
+    """A point of the table, and what stands on it, in the range frame, from a scan with the arm at home."""
     seen = cell.scan()
-    view = seen.view()
+    view, T_range_map = seen.view(), inverse(T_world_range) @ seen.T_world_range
     found = support_plane(view, np.random.default_rng(0))
     if not found.found:
         raise CannotAct(f"the table was not found in the scan: {found.reason}.")
     heights = apply(found.T_world_sensor, view.points_sensor())[::-1, :, 2]  # in the map's own order of rows
     with np.errstate(invalid="ignore"):
         j, i = np.nonzero(np.abs(heights) < ON_SIGMAS * max(seen.noise, found.rms))
-        standing = np.argwhere(~(heights <= STANDING_M))[:, ::-1] * seen.cell
-    table = np.append((np.mean([i, j], axis=1) + 0.5) * seen.cell, seen.elevation[j, i].mean())
-    if not len(standing):
+        v, u = np.nonzero(~(heights <= STANDING_M))
+    table = apply(T_range_map, np.append((np.mean([i, j], axis=1) + 0.5) * seen.cell, seen.elevation[j, i].mean()))
+    if not len(u):
         return TablePoint(table, table_z), _Standing(0.0, table[:2], table[:2])
-    return TablePoint(table, table_z), _Standing(float(np.nanmax(heights)), standing.min(axis=0), standing.max(axis=0) + seen.cell)
+    standing = apply(T_range_map, np.stack([(u + 0.5) * seen.cell, (v + 0.5) * seen.cell, np.zeros(len(u))], axis=1))[:, :2]
+    return TablePoint(table, table_z), _Standing(float(np.nanmax(heights)), standing.min(axis=0), standing.max(axis=0))
 
 
 def _world(station: Station, standing: _Standing) -> World:
@@ -237,7 +239,10 @@ class _Showman:
             self.ledger.fall(entry, path.reason, bodies=path.separating[:2])
             return None
         self._follow(path)
-        face = find_cube_face(self.cell.scan(), self.options.side_m)
+        seen = self.cell.scan()
+        face = find_cube_face(seen, self.options.side_m)
+        T_range_map = inverse(self.station.workcell.finder.T_world_range) @ seen.T_world_range
+        face = replace(face, middle_range=apply(T_range_map, face.middle_range), normal_range=rotate(T_range_map, face.normal_range))
         if face.found and face.middle_range[2] < self.table.point_range[2] + self.top:
             face = replace(face, found=False, reason="the face that was found is no higher than what stands on the table")
         if not face.found:
