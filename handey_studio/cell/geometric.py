@@ -12,7 +12,7 @@ from handey_studio.cell.guarded import first_touch, motion_at
 from handey_studio.cell.motions import check_motion, check_opening
 from handey_studio.cell.physics import settle
 from handey_studio.cell.protocol import TOUCH_N, Compliance, Moved, Wrench
-from handey_studio.cell.recording import Event, Recording
+from handey_studio.cell.recording import Event, Recording, as_commanded
 from handey_studio.cell.truth import TrueState, true_bodies
 from handey_studio.cell.workcell import Workcell
 from handey_studio.geometry.transforms import inverse
@@ -113,16 +113,10 @@ class GeometricCell(TrueState):
         else:
             self._carry()
         events = () if touched_N is None else (Event(time, "touch", touched_N),)
-        return Moved("contact" if self._touching else "arrived", self._recorded(times, q, events))
+        return Moved("contact" if self._touching else "arrived", as_commanded(times, q, self._opening, self.finger_force(), events))
 
     def _still(self) -> Recording:
-        return self._recorded(np.zeros(1), self._q[None])
-
-    def _recorded(self, times: NDArray, q: NDArray, events: tuple[Event, ...] = ()) -> Recording:
-        """Forces are unknown to geometry and stand as zero."""
-        n = len(times)
-        none, fingers = np.zeros((n, 3)), np.full(n, self.finger_force())
-        return Recording(times, q, q, np.full(n, self._opening), fingers, none, none, events)
+        return as_commanded(np.zeros(1), self._q[None], self._opening, self.finger_force())
 
     def _carry(self) -> None:
         """Put the held body where the hand has it; once it has left its place, let the others settle."""

@@ -34,6 +34,10 @@ class PhysicalCell(ControlledCell, TrueState):
     def held_truly(self) -> str | None:
         return self._simulated.held()
 
+    def touched_truly(self) -> set[tuple[str, str]]:
+        """What of the robot (`link3`, `hand`, `finger_left` …) has touched which body so far, for benchmarks and checkers only."""
+        return self._simulated.touched()
+
     def _sweep(self) -> DepthMap:
         """What the range finder sees once everything is at rest."""
         bias = self._simulated.scan_bias()

@@ -1,17 +1,27 @@
-"""A recorded cell: it plays a depth map that was taken before, and cannot act."""
+"""A recorded cell: it plays depth that was taken before, and writes the motions it is asked for into a folder."""
 
+import json
 import os
 import zipfile
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
+from handey_studio.base.files import replace_file
+from handey_studio.cell.motions import check_motion, check_opening
 from handey_studio.cell.protocol import TOUCH_N, CannotAct, Compliance, Moved, Wrench
+from handey_studio.cell.recording import as_commanded
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.motion import Trajectory
 from handey_studio.sensing.depth_map import DepthMap
+from handey_studio.sensing.files import read_depth
+from handey_studio.sensing.support import support_planes
+from handey_studio.sensing.view_map import depth_map_of
 from handey_studio.world.robot import Robot
 
 MAX_FILE_BYTES = 200_000_000
@@ -20,26 +30,35 @@ KEYS = ("elevation", "cell", "T_world_range", "passed", "noise", "outline_error"
 
 
 class RecordedCell:
-    """Answers every scan with one recorded depth map. The arm stands at its home and cannot move."""
+    """Answers scans with recorded depth maps, one after the other, the last again and again. Not a value: it counts.
+
+    With a folder `out` it takes motions: each is written there as JSON (`handey/motion/1`), and the arm is then taken to be where it
+    was sent. Nothing is ever felt: descents and settlings arrive, fingers close on nothing. Without one it cannot act.
+    """
 
     physics = False
 
-    def __init__(self, robot: Robot, depth_map: DepthMap) -> None:
-        self._robot, self._map = robot, depth_map
+    def __init__(self, robot: Robot, scans: Sequence[DepthMap], out: Path | None = None) -> None:
+        if not scans:
+            raise BadInput("a recorded cell needs at least one depth map to play.")
+        self._robot, self._scans, self._out = robot, tuple(scans), out
+        self._played = self._written = 0
+        self._q, self._opening = robot.home, robot.hand.opening_max
 
     @classmethod
-    def from_file(cls, robot: Robot, path: str | os.PathLike) -> "RecordedCell":
-        """The cell that plays a depth map's `.npz` file."""
-        return cls(robot, read_depth_map(path))
+    def from_files(cls, robot: Robot, paths: Sequence[str | os.PathLike], out: Path | None = None) -> "RecordedCell":
+        """The cell that plays depth files: a depth map's `.npz`, or any image or cloud, its camera beside it as `NAME.camera.json`."""
+        return cls(robot, [_depth_map(Path(path)) for path in paths], out)
 
     def scan(self) -> DepthMap:
-        return self._map
+        self._played += 1
+        return self._scans[min(self._played, len(self._scans)) - 1]
 
     def joints(self) -> NDArray:
-        return self._robot.home
+        return self._q
 
     def opening(self) -> float:
-        return self._robot.hand.opening_max
+        return self._opening
 
     def wrench(self) -> Wrench:
         return Wrench(np.zeros(3), np.zeros(3))
@@ -51,20 +70,51 @@ class RecordedCell:
         """Nothing moves here."""
 
     def follow(self, motion: Trajectory) -> Moved:
-        raise _refusal()
+        return self._take("follow", motion, {})
 
     def descend(self, motion: Trajectory, until_N: float = TOUCH_N) -> Moved:
-        raise _refusal()
+        return self._take("descend", motion, {"until_N": until_N})
 
     def settle(self, compliance: Compliance = Compliance()) -> Moved:
-        raise _refusal()
+        self._write("settle", {"force_N": compliance.force_N, "travel_m": compliance.travel_m})
+        return Moved("arrived", as_commanded(np.zeros(1), self._q[None], self._opening))
 
     def grip(self, opening: float, force_N: float | None = None) -> Moved:
-        raise _refusal()
+        check_opening(self._robot.hand, opening)
+        self._write("grip", {"opening_m": opening, "force_N": self._robot.hand.force if force_N is None else force_N})
+        self._opening = float(opening)
+        return Moved("arrived", as_commanded(np.zeros(1), self._q[None], self._opening))
+
+    def _take(self, call: str, motion: Trajectory, more: dict[str, Any]) -> Moved:
+        """Write a motion, and stand at its end."""
+        check_motion(motion, self._robot, self._q)
+        content = {key: getattr(motion, key).tolist() for key in ("time_s", "q_rad", "hand_opening_m")}
+        self._write(call, {"joint_names": self._robot.joint_names} | content | more)
+        self._q, self._opening = motion.q_rad[-1], float(motion.hand_opening_m[-1])
+        return Moved("arrived", as_commanded(motion.time_s, motion.q_rad, self._opening))
+
+    def _write(self, call: str, content: dict[str, Any]) -> None:
+        if self._out is None:
+            raise CannotAct("this cell plays recorded depth and has no arm to move; give it a folder for the motions, or plan only.")
+        self._written += 1
+        path = self._out / f"{self._written:04d}-{call}.json"
+        try:
+            self._out.mkdir(parents=True, exist_ok=True)
+            replace_file(path, json.dumps({"schema": "handey/motion/1", "call": call, "robot": self._robot.name} | content).encode())
+        except OSError as error:
+            raise CannotAct(f'the motion cannot be written to "{path}": {error.strerror}.') from None
 
 
-def _refusal() -> CannotAct:
-    return CannotAct("this cell plays a recorded depth map and has no arm to move; plan here, and execute in a simulated or a real cell.")
+def _depth_map(path: Path) -> DepthMap:
+    """The depth map in a file. Depth whose sensor's place nobody told stands on its own support, which becomes z = 0."""
+    if path.suffix.lower() == ".npz":
+        return read_depth_map(path)
+    camera = path.with_name(f"{path.stem}.camera.json")
+    reading = read_depth(path, camera if camera.is_file() else None)
+    view = reading.view
+    if not reading.knows_world:
+        view = replace(view, T_world_sensor=support_planes(view, np.random.default_rng(0)).table.T_world_sensor)
+    return depth_map_of(view)
 
 
 def write_depth_map(path: str | os.PathLike, depth_map: DepthMap) -> None:

@@ -51,6 +51,13 @@ def joined(recordings: Sequence[Recording]) -> Recording:
     return Recording(time_s=times, events=tuple(events), **columns)
 
 
+def as_commanded(time_s: NDArray, q_rad: NDArray, opening_m: float, finger_force_N: float = 0.0, events: Sequence[Event] = ()) -> Recording:
+    """The recording of a motion that was followed exactly and in which the wrist felt nothing: (n,), (n, joints)."""
+    n = len(time_s)
+    none = np.zeros((n, 3))
+    return Recording(time_s, q_rad, q_rad, np.full(n, opening_m), np.full(n, finger_force_N), none, none, tuple(events))
+
+
 @dataclass(frozen=True)
 class Tracking:
     """How far the arm was off its command at most: any joint [rad], and the hand's origin [mm]."""

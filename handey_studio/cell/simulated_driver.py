@@ -22,7 +22,7 @@ class SimulatedDriver(Simulation):
         super().__init__(arm, bodies, obstacles)
         self._clock, self._now = FaultClock(faults), 0.0
         self._brings = [number for number, fault in enumerate(faults) if fault.kind == "obstacle"]
-        self._met: dict[int, str] = {}
+        self._shoved: dict[int, str] = {}
 
     def begin(self, call: Call) -> None:
         self._clock.called(call, self._now)
@@ -59,10 +59,10 @@ class SimulatedDriver(Simulation):
 
     def _switch_on_body(self, number: int, fault: Fault, on: bool) -> None:
         """A fault of a body, or of whatever the hand holds when it begins."""
-        name = self._met.get(number) or fault.body or self.held()
+        name = self._shoved.get(number) or fault.body or self.held()
         if name is None:
             return
-        self._met[number] = name
+        self._shoved[number] = name
         if fault.kind == "slip":
             self.rub(name, fault.size if on else 1.0)
         else:

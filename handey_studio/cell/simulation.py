@@ -41,6 +41,8 @@ class Simulation:
         self._hand_bodies = np.array([self.model.body(name).id for name in ("hand", *FINGERS)])
         self._is_pad = np.isin(np.arange(self.model.nbody), self._hand_bodies[1:])
         self._base = self.model.body("link0").id
+        self._is_robot = np.arange(self.model.nbody) >= self._base
+        self._met: set[tuple[int, ...]] = set()
         limits = np.array(arm.model.effortLimit, dtype=float)
         self._effort = np.where((limits > 0) & np.isfinite(limits), limits, np.inf)
         self._finger_gain = FINGER_RATE**2 * float(self.model.dof_armature[self.finger_dofs[0]])
@@ -69,7 +71,9 @@ class Simulation:
         """
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
-        self._turn_with_hand()
+        owners = model.geom_bodyid[data.contact.geom]
+        self._met.update(map(tuple, owners[self._is_robot[owners].any(axis=1)].tolist()))
+        self._turn_with_hand(owners)
         dofs = self.arm_dofs
         error = to.q - to.velocity * self.dt - data.qpos[self._q_at]
         behind = to.velocity - to.acceleration * self.dt - data.qvel[dofs]
@@ -80,14 +84,13 @@ class Simulation:
         data.qfrc_applied[self.finger_dofs] = self._finger_push(fingers) + data.qfrc_bias[self.finger_dofs]
         mujoco.mj_step2(model, data)
 
-    def _turn_with_hand(self) -> None:
-        """Tell the grip's contacts how pad and body would accelerate apart if no joint's rate changed.
+    def _turn_with_hand(self, owners: NDArray) -> None:
+        """Tell the grip's contacts, between bodies `owners` (n, 2), how pad and body would accelerate apart if no joint's rate changed.
 
         The engine leaves that term out (the Jacobian's own change), and a body held by a turning arm would slide out of the pads by
         millimetres. Half of it: then pad and body go together in the middle of the step, which is how far they get.
         """
         contacts = self.data.contact
-        owners = self.model.geom_bodyid[contacts.geom]
         rows = np.flatnonzero(self._is_pad[owners].any(axis=1) & (contacts.efc_address >= 0))
         if not len(rows):
             return
@@ -169,6 +172,13 @@ class Simulation:
                     by_finger[finger] = by_finger.get(finger, 0.0) + float(force[0])
         both = {name: min(forces.values()) for name, forces in pressed.items() if len(forces) == 2 and min(forces.values()) > 0}
         return max(both, key=both.__getitem__, default=None)
+
+    def touched(self) -> set[tuple[str, str]]:
+        """Which of the robot's parts (`link3`, `hand`, `finger_left` …) has touched which body since the start, as pairs of names."""
+        names = {self.model.body(f"body{k}").id: body.name for k, body in enumerate(self.bodies)}
+        names |= {self.model.body(f"ghost{k}").id: body.name for k, body in enumerate(self._ghosts)}
+        pairs = (sorted(pair, key=names.__contains__) for pair in self._met)
+        return {(self.model.body(robot).name, names[other]) for robot, other in pairs}
 
     def rub(self, name: str, share: float) -> None:
         """The friction between the fingers and a body becomes a share of its own."""
