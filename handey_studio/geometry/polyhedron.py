@@ -150,11 +150,11 @@ def polyhedron_from_polygons(vertices: ArrayLike, polygons: list[list[int]]) -> 
     corners = np.asarray(vertices, dtype=float).reshape(-1, 3)
     if not np.isfinite(corners).all():
         raise BadInput("a corner is not a finite number; every coordinate must be finite metres.")
-    triangles = np.array([t for polygon in polygons for t in _fan(corners, polygon)], dtype=int).reshape(-1, 3)
+    triangles = triangles_of(corners, polygons)
     if len(triangles) > MAX_TRIANGLES:
         raise BadInput(f"it has {len(triangles)} triangles, the limit for a polyhedral part is {MAX_TRIANGLES}; simplify the mesh.")
-    corners, triangles = _weld(corners, triangles)
-    _check_closed(triangles)
+    corners, triangles = welded(corners, triangles)
+    check_closed(triangles)
     if np.einsum("ij,ij->i", corners[triangles[:, 0]], np.cross(corners[triangles[:, 1]], corners[triangles[:, 2]])).sum() < 0:
         triangles = triangles[:, ::-1]
     _check_no_self_intersection(corners, triangles)
@@ -196,6 +196,15 @@ def _sides(loop: tuple[int, ...]) -> list[tuple[int, int]]:
     return list(zip(loop, loop[1:] + loop[:1], strict=True))
 
 
+def triangles_of(corners: NDArray, polygons: list[list[int]]) -> NDArray:
+    """Triangles (t, 3) of polygons over corners (n, 3) [m]; polygons may be concave. Raises BadInput for one that is none."""
+    if all(len(polygon) == 3 for polygon in polygons):
+        triangles = np.array(polygons, dtype=int).reshape(-1, 3)
+        if not len(triangles) or (triangles.min() >= 0 and triangles.max() < len(corners)):
+            return triangles
+    return np.array([t for polygon in polygons for t in _fan(corners, polygon)], dtype=int).reshape(-1, 3)
+
+
 def _fan(corners: NDArray, polygon: list[int]) -> NDArray:
     """Triangles of one polygon of a file, which may be concave."""
     if len(polygon) < 3 or min(polygon) < 0 or max(polygon) >= len(corners):
@@ -217,7 +226,7 @@ def _fan(corners: NDArray, polygon: list[int]) -> NDArray:
     return np.asarray(polygon)[local.face_triangles(0)]
 
 
-def _weld(corners: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray]:
+def welded(corners: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray]:
     """Coinciding corners made one, triangles without area dropped."""
     _, first, inverse = np.unique(np.round(corners / WELD_M).astype(np.int64), axis=0, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1)[triangles]
@@ -226,7 +235,7 @@ def _weld(corners: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray]:
     return corners, triangles[distinct]
 
 
-def _check_closed(triangles: NDArray) -> None:
+def check_closed(triangles: NDArray) -> None:
     """Every directed side must meet its opposite exactly once."""
     if len(triangles) < 4:
         raise BadInput(f"it has {len(triangles)} triangles; a solid needs at least 4.")

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.geometry.distances import Surface, signed_distances
 from handey_studio.geometry.transforms import apply
-from handey_studio.modeling.distances import Surface, signed_distances
 from handey_studio.modeling.scans import Scan
 from handey_studio.sensing.drawing import camera_of
 from handey_studio.sensing.facets import sigma_at
@@ -39,8 +39,8 @@ def object_readings(
 ) -> Readings:
     """The readings of a scan that the model with these corners (k, 3) [m] should explain.
 
-    Higher than `least_height` [m], and than the noise, above the support, in a piece that comes within `reach` [m] of the surface; or, where a `mask` (H, W)
-    tells the object's readings, those in it.
+    Higher than `least_height` [m], and than the noise, above the support, in a piece that comes within `reach` [m] of the surface; or,
+    where a `mask` (H, W) tells the object's readings, those in it.
     """
     view = scan.view
     pieces, below = _pieces_of(scan, max(least_height, ABOVE_SIGMAS * view.noise))

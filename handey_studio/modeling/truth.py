@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron
+from handey_studio.geometry.distances import Surface, signed_distances, surface_of
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.modeling.checks import solid_checks
-from handey_studio.modeling.distances import Surface, signed_distances, surface_of
 from handey_studio.modeling.object_readings import Readings, object_readings
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.truth_values import ScanTruth, Truth

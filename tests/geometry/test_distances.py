@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from handey_studio.geometry import Polyhedron, box, polyhedron_from_polygons
-from handey_studio.modeling.distances import signed_distances, surface_of
+from handey_studio.geometry.distances import signed_distances, surface_of
 from handey_studio.world import Library
 
 LIBRARY = Library.choose()

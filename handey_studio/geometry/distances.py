@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from handey_studio.geometry import Polyhedron
+from handey_studio.geometry.polyhedron import Polyhedron
 
 FULL_TURN = 2.0 * np.pi
 
