@@ -4,6 +4,7 @@ A command imports the rooms that it needs when it runs: together they take secon
 """
 
 from handey_studio.commands import (
+    bench_act,
     bench_locate,
     bench_motion,
     bench_moves,
@@ -15,6 +16,9 @@ from handey_studio.commands import (
     model_replay,
     model_suggest,
     move,
+    part_import,
+    part_list,
+    part_show,
     path,
     plan,
     robot_check,
@@ -39,10 +43,14 @@ COMMANDS = (
     calibrate,
     export,
     bench_moves,
+    bench_act,
     bench_locate,
     bench_motion,
     bench_space,
     fit_score,
+    part_import,
+    part_list,
+    part_show,
     robot_check,
     robot_list,
 )

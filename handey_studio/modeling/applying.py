@@ -30,7 +30,7 @@ from handey_studio.modeling.operations import (
     Sketch,
     TakeSuggestion,
 )
-from handey_studio.modeling.planes import inherited
+from handey_studio.modeling.planes import Change, inherited
 from handey_studio.modeling.solids import combined, cut_by_plane, mirrored
 from handey_studio.modeling.soundness import sound
 from handey_studio.modeling.state import Maker, State
@@ -174,7 +174,7 @@ def _with_solid(
     return replace(state, solid=solid, sources=tuple(s for s, _ in labels), makers=tuple(m for _, m in labels))
 
 
-def _with_change(state: State, change: editing.Change) -> State:
+def _with_change(state: State, change: Change) -> State:
     """The state with its solid edited; faces that have moved are no longer what was seen or assumed."""
     before, after = _solid(state), change.solid
     sources = []

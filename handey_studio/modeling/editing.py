@@ -5,16 +5,16 @@ meet there, so that right angles stay right. What would break the solid is refus
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handey_studio.base import BadInput, Value, measured
+from handey_studio.base import BadInput, measured
 from handey_studio.geometry import Edge, Polyhedron
 from handey_studio.geometry.transforms import rotation_about
-from handey_studio.modeling.planes import corners_on_planes, faces_at_corners, inherited, told_point
+from handey_studio.modeling.planes import Change, corners_on_planes, faces_at_corners, inherited, told_point
 from handey_studio.modeling.soundness import shrunk, sound, with_same_faces, without_slivers
+from handey_studio.modeling.sweeping import swept_face
 
 PARALLEL_RAD = float(np.deg2rad(0.2))  # what the polyhedron itself takes for one plane
 LEAST_WAY_M = 1e-6
@@ -22,17 +22,15 @@ HALVINGS = 24  # finds how far a move can go, as a share of what was asked
 SOUND_HALVINGS = 11  # the same where each try takes ten times as long
 
 
-@dataclass(frozen=True, eq=False)
-class Change(Value):
-    """An edited solid, and for each of its faces the number of the face that it was before."""
-
-    solid: Polyhedron
-    came_from: tuple[int, ...]
-
-
 def moved_face(solid: Polyhedron, f: int, distance: float) -> Change:
     """The solid with face f moved along its normal by `distance` [m], outward when positive. Raises BadInput with the limit."""
-    return _moved(solid, np.where(np.arange(len(solid.faces)) == f, distance, 0.0), "the face", abs(distance))
+    try:
+        return _moved(solid, np.where(np.arange(len(solid.faces)) == f, distance, 0.0), "the face", abs(distance))
+    except BadInput as refused:
+        try:
+            return swept_face(solid, f, distance)
+        except BadInput:
+            raise refused from None
 
 
 def moved_edge(solid: Polyhedron, edge: Edge, way: ArrayLike) -> Change:

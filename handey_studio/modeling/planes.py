@@ -4,20 +4,30 @@ Faces are exactly planar because every corner is computed from the planes that m
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from handey_studio.base import BadInput, measured
+from handey_studio.base import BadInput, Value, measured
 from handey_studio.geometry import Polyhedron
 
 SAME_M = 1e-6  # corners this near are one corner, faces this near to a plane are in it
 SAME_DIRECTION = 0.9999
+THIN_M = 1e-9  # the normal of a triangle less high than this means nothing
 DEPENDENT = 1e-6  # planes whose normals are this near to dependent have no corner of their own
 
 Label = TypeVar("Label")
+
+
+@dataclass(frozen=True, eq=False)
+class Change(Value):
+    """An edited solid, and for each of its faces the number of the face that it was before."""
+
+    solid: Polyhedron
+    came_from: tuple[int, ...]
 
 
 def corners_on_planes(solid: Polyhedron, normals: NDArray, offsets: NDArray) -> NDArray:
@@ -27,12 +37,7 @@ def corners_on_planes(solid: Polyhedron, normals: NDArray, offsets: NDArray) -> 
     and would no longer do so in one point.
     """
     meeting = faces_at_corners(solid)
-    corners = np.array(solid.vertices)
-    apart = np.zeros(len(corners))
-    for v, faces in enumerate(meeting):
-        N, d = normals[faces], offsets[faces]
-        corners[v] += np.linalg.pinv(N, rcond=DEPENDENT) @ (d - N @ corners[v])
-        apart[v] = np.abs(N @ corners[v] - d).max()
+    corners, apart = where_planes_meet(solid.vertices, meeting, normals, offsets)
     if apart.max() > SAME_M:
         v = int(np.argmax(apart))
         raise BadInput(
@@ -40,6 +45,18 @@ def corners_on_planes(solid: Polyhedron, normals: NDArray, offsets: NDArray) -> 
             f"{measured(float(apart[v]), 'm')}; move them together, or cut and join instead."
         )
     return corners
+
+
+def where_planes_meet(points: NDArray, meeting: Sequence[Sequence[int]], normals: NDArray, offsets: NDArray) -> tuple[NDArray, NDArray]:
+    """Points (n, 3) [m] moved as little as it takes to be in the planes `meeting` there, and how far (n,) [m] they still are from one."""
+    here = np.full((len(meeting), max(1, *map(len, meeting))), -1)
+    for v, planes in enumerate(meeting):
+        here[v, : len(planes)] = planes
+    N = np.where((here >= 0)[..., None], normals[here], 0.0)  # rows of zeros ask for nothing
+    d = np.where(here >= 0, offsets[here], 0.0)
+    short = d - np.einsum("vfi,vi->vf", N, points)
+    moved = points + np.einsum("vif,vf->vi", np.linalg.pinv(N, rcond=DEPENDENT), short)
+    return moved, np.abs(np.einsum("vfi,vi->vf", N, moved) - d).max(axis=1)
 
 
 def faces_at_corners(solid: Polyhedron) -> list[list[int]]:
@@ -51,14 +68,24 @@ def faces_at_corners(solid: Polyhedron) -> list[list[int]]:
     return meeting
 
 
-def onto_planes(solid: Polyhedron, normals: NDArray, offsets: NDArray) -> Polyhedron:
-    """The solid with each face put exactly into the one of the planes, (k, 3) and (k,) [m], that it lies in but for rounding."""
-    exact_normals, exact_offsets = np.array(solid.normals), np.array(solid.offsets)
-    for f in range(len(solid.faces)):
-        k, sign, off = nearest_plane(solid, f, normals, offsets)
-        if off < SAME_M:
-            exact_normals[f], exact_offsets[f] = sign * normals[k], sign * offsets[k]
-    return Polyhedron(corners_on_planes(solid, exact_normals, exact_offsets), solid.faces)
+def onto_planes(vertices: NDArray, triangles: NDArray, normals: NDArray, offsets: NDArray, within: float) -> NDArray:
+    """Corners (n, 3) [m] of a mesh put exactly where those of the planes, (k, 3) and (k,) [m], meet that its triangles lie in but for
+    `within` [m]; a corner where these do not meet stays."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    area = np.linalg.norm(across, axis=1, keepdims=True)
+    thin = area[:, 0] < THIN_M * np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2).max(axis=0)
+    turned = np.abs(across @ normals.T) / np.maximum(area, 1e-300)
+    off = np.abs(vertices @ normals.T - offsets)[triangles].max(axis=1)
+    off[(turned < SAME_DIRECTION) | thin[:, None]] = np.inf
+    plane = np.argmin(off, axis=1)
+    found = off[np.arange(len(plane)), plane] < within
+    meeting: list[set[int]] = [set() for _ in vertices]
+    for triangle, k in zip(triangles[found], plane[found], strict=True):
+        for corner in triangle:
+            meeting[corner].add(int(k))
+    exact, apart = where_planes_meet(vertices, [sorted(planes) for planes in meeting], normals, offsets)
+    return np.where((apart < SAME_M)[:, None], exact, vertices)
 
 
 def nearest_plane(solid: Polyhedron, f: int, normals: NDArray, offsets: NDArray) -> tuple[int, float, float]:

@@ -1,6 +1,8 @@
 """Exact operations on solids: join, cut, common, half spaces, mirror images, prisms between two planes (Handey 1987 §1).
 
-The booleans are manifold3d's, in double precision; every face of a result is then put back exactly into the plane that it came from.
+The booleans are manifold3d's, in double precision. Faces that are meant to be flush never are to the last bit, and what lies between would
+come out as films: so a tool is made half a micrometre larger, and every corner of the result is put back to where the planes meet that its
+faces came from, which takes the steps away again.
 """
 
 from typing import Literal
@@ -13,11 +15,14 @@ from scipy.sparse.csgraph import connected_components
 
 from handey_studio.base import BadInput, measured
 from handey_studio.geometry import Face, Polyhedron, polyhedron_from_polygons
-from handey_studio.modeling.planes import corners_on_planes, nearest_plane, onto_planes
-from handey_studio.modeling.soundness import SLIVER_M, checked, narrowest, sound, without_slivers
+from handey_studio.geometry.soundness import unmatched_sides
+from handey_studio.modeling.caps import without_caps
+from handey_studio.modeling.planes import SAME_M, corners_on_planes, nearest_plane, onto_planes, told_point
+from handey_studio.modeling.soundness import SLIVER_M, checked, narrowest, sound, welded, without_slivers
 
 FLUSH_M = 2e-5  # a face of a tool this near to a plane of the solid is meant to be in it; what lay between would be a sliver
-DEEPER_M = 5e-7  # a cut along a face goes this much deeper, so that rounding leaves no film; its face is then put where it belongs
+LARGER_M = 5e-7  # so much larger than asked is every tool while it works
+FOUND_M = 5e-6  # a face of a result this near to a plane came from it
 SAME_VOLUME_M3 = 1e-13
 FAR_M = 3.0
 WORDS = {"join": "joining them", "cut": "the cut", "common": "keeping what is common"}
@@ -29,12 +34,17 @@ def combined(solid: Polyhedron, tool: Polyhedron, how: Literal["join", "cut", "c
     Raises BadInput with one sentence when nothing is left, nothing changes, or what is left is no single solid body without slivers.
     """
     tool = _made_flush(tool, solid)
-    a, b = _manifold(solid), _manifold(tool)
+    _check_effect(solid, tool, how)
+    a, b = _manifold(solid), _manifold(_larger(tool))
     result = {"join": a + b, "cut": a - b, "common": a ^ b}[how]
-    _check_effect(a, b, result, how)
     normals = np.concatenate([solid.normals, tool.normals])
     offsets = np.concatenate([solid.offsets, tool.offsets])
     return without_slivers(_polyhedron(result, normals, offsets, WORDS[how]), WORDS[how], solid, tool)
+
+
+def common_volume(a: Polyhedron, b: Polyhedron) -> float:
+    """The volume [m³] of what two solids have in common."""
+    return float((_manifold(a) ^ _manifold(b)).volume())
 
 
 def cut_by_plane(solid: Polyhedron, point: ArrayLike, normal: ArrayLike) -> Polyhedron:
@@ -46,7 +56,7 @@ def cut_by_plane(solid: Polyhedron, point: ArrayLike, normal: ArrayLike) -> Poly
         raise BadInput("the plane does not pass through the solid on the side that it would cut off; nothing would change.")
     if heights.min() > -SLIVER_M:
         raise BadInput("the plane would cut off the whole solid; turn it round or move it.")
-    result = _manifold(solid).trim_by_plane(tuple(-normal), DEEPER_M - offset)
+    result = _manifold(solid).trim_by_plane(tuple(-normal), LARGER_M - offset)
     normals, offsets = np.vstack([solid.normals, normal]), np.append(solid.offsets, offset)
     return without_slivers(_polyhedron(result, normals, offsets, WORDS["cut"]), WORDS["cut"], solid)
 
@@ -118,18 +128,29 @@ def _made_flush(tool: Polyhedron, solid: Polyhedron) -> Polyhedron:
     return flush if narrowest(tool)[0] > 4.0 * FLUSH_M else tool
 
 
-def _check_effect(a: manifold3d.Manifold, b: manifold3d.Manifold, result: manifold3d.Manifold, how: str) -> None:
-    """Raises BadInput when the two do not meet, or the result is empty or no other than the first."""
-    common = (a ^ b).volume()
-    if how == "join" and common < SAME_VOLUME_M3:
-        gap = a.min_gap(b, FAR_M)
+def _larger(tool: Polyhedron) -> Polyhedron:
+    """The tool with each face moved out by half a micrometre."""
+    return Polyhedron(corners_on_planes(tool, tool.normals, tool.offsets + LARGER_M), tool.faces)
+
+
+def _check_effect(solid: Polyhedron, tool: Polyhedron, how: str) -> None:
+    """Raises BadInput when the two do not meet, nothing would be left, or nothing would change."""
+    common, whole, added = common_volume(solid, tool), solid.volume_and_centroid[0], tool.volume_and_centroid[0]
+    apart, all_of_it, inside = common < SAME_VOLUME_M3, whole - common < SAME_VOLUME_M3, added - common < SAME_VOLUME_M3
+    if how == "join" and apart:
+        gap = _manifold(solid).min_gap(_manifold(tool), FAR_M)
         if gap > FLUSH_M:
             raise BadInput(f"the two bodies do not touch, they are {measured(gap, 'm')} apart; a part is one body.")
-    if result.volume() < SAME_VOLUME_M3:
-        raise BadInput("the cut would leave nothing of the solid." if how == "cut" else "the two bodies have nothing in common.")
-    if abs(result.volume() - a.volume()) < SAME_VOLUME_M3:
-        told = {"join": "the new body lies wholly inside the solid", "cut": "the cut does not touch the solid"}
-        raise BadInput(f"{told.get(how, 'the solid lies wholly inside the other body')}; nothing would change.")
+    if how == "join" and inside:
+        raise BadInput("the new body lies wholly inside the solid; nothing would change.")
+    if how == "cut" and apart:
+        raise BadInput("the cut does not touch the solid; nothing would change.")
+    if how == "cut" and all_of_it:
+        raise BadInput("the cut would leave nothing of the solid.")
+    if how == "common" and apart:
+        raise BadInput("the two bodies have nothing in common.")
+    if how == "common" and all_of_it:
+        raise BadInput("the solid lies wholly inside the other body; nothing would change.")
 
 
 def _polyhedron(result: manifold3d.Manifold, normals: NDArray, offsets: NDArray, what: str) -> Polyhedron:
@@ -137,7 +158,14 @@ def _polyhedron(result: manifold3d.Manifold, normals: NDArray, offsets: NDArray,
     mesh = result.to_mesh64()
     vertices, triangles = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
     triangles = _one_body(vertices, triangles, what)
-    return checked(onto_planes(polyhedron_from_polygons(vertices, triangles.tolist()), normals, offsets))
+    vertices = onto_planes(vertices, triangles, normals, offsets, FOUND_M)
+    triangles = welded(vertices)[triangles]
+    triangles = without_caps(vertices, triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)], SAME_M)
+    _, twice = unmatched_sides(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]))
+    if len(twice):
+        at = told_point(vertices[twice[0]].mean(axis=0))
+        raise BadInput(f"{what} would leave bodies that only touch along an edge at {at}; let them overlap or keep them apart.")
+    return checked(polyhedron_from_polygons(vertices, triangles.tolist()))
 
 
 def _one_body(vertices: NDArray, triangles: NDArray, what: str) -> NDArray:

@@ -23,7 +23,7 @@ def sound(vertices: NDArray, faces: Sequence[Face]) -> Polyhedron:
 
     Coinciding corners are welded and coplanar neighbours merged. Raises BadInput with one sentence when no sound solid is left.
     """
-    number = _welded(vertices)
+    number = welded(vertices)
     polygons: list[list[int]] = []
     for face in faces:
         loops = [_without_repeats([int(number[c]) for c in loop]) for loop in face.loops]
@@ -39,7 +39,7 @@ def with_same_faces(solid: Polyhedron, vertices: NDArray) -> Polyhedron | None:
 
     Raises BadInput with one sentence when the surface would pass through itself.
     """
-    if (_welded(vertices) != np.arange(len(vertices))).any():
+    if (welded(vertices) != np.arange(len(vertices))).any():
         return None
     changed = Polyhedron(vertices, solid.faces)
     if any(shrunk(vertices[list(face.outer)]) for face in solid.faces):
@@ -130,9 +130,9 @@ def _groups(pairs: list[tuple[int, int]], count: int) -> int:
     return int(connected_components(coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)), directed=False)[0])
 
 
-def _welded(vertices: NDArray) -> NDArray:
-    """For each corner the number of the one that stands for all that coincide with it."""
-    near = np.linalg.norm(vertices[:, None] - vertices[None], axis=2) < SAME_M
+def welded(vertices: NDArray, within: float = SAME_M) -> NDArray:
+    """For each corner (n, 3) the number of the one that stands for all that are `within` [m] of it."""
+    near = np.linalg.norm(vertices[:, None] - vertices[None], axis=2) < within
     _, group = connected_components(coo_array(near), directed=False)
     first = np.full(group.max() + 1, len(vertices))
     np.minimum.at(first, group, np.arange(len(vertices)))

@@ -51,25 +51,42 @@ def test_a_moved_face_goes_exactly_as_far_and_no_other_moves(name, number, dista
 
 @pytest.mark.parametrize("pose", [np.eye(4), POSE], ids=["straight", "turned"])
 def test_the_limit_of_a_move_is_where_an_edge_ends(pose):
+    """A roof of 45 mm over a trapezium: its flat top can rise until it is a ridge."""
+    solid = posed(prism(np.array([[0, 0], [0.1, 0], [0.08, 0.03], [0.02, 0.03]]), 0.05), pose)
+    top = face_at(solid, FaceAt(apply(pose, (0.05, 0.03, 0.02)), rotate(pose, (0, 1, 0))))
+    with pytest.raises(BadInput, match=r"the face cannot move by 60 mm that way, the limit is 45 mm: the edge at .* turn round"):
+        moved_face(solid, top, 0.06)
+    ridge = moved_face(solid, top, 0.045).solid
+    check_solid(ridge)
+    assert len(ridge.faces) == 5
+    assert_allclose(ridge.volume_and_centroid[0], 0.5 * 0.1 * 0.075 * 0.05, rtol=1e-9)
+    with pytest.raises(BadInput, match=r"the limit is 29\.9\d? mm: nothing would be left"):
+        moved_face(solid, top, -0.03)
+
+
+@pytest.mark.parametrize("pose", [np.eye(4), POSE], ids=["straight", "turned"])
+def test_the_low_side_of_a_step_grows_past_the_high_one(pose):
     solid = posed(stair(), pose)
     low = face_at(solid, FaceAt(apply(pose, (-0.025, 0, 0.02)), rotate(pose, (0, 0, 1))))
-    with pytest.raises(BadInput, match=r"cannot move by 60 mm that way, the limit is 40 mm: the edge at .* turn round"):
-        moved_face(solid, low, 0.06)
-    with pytest.raises(BadInput, match=r"cannot move by 40 mm that way, the limit is 39\.(8\d|9) mm"):
-        moved_face(solid, low, -0.04)
-    flush = moved_face(solid, low, 0.04).solid
-    assert len(flush.faces) == 6
-    assert_allclose(flush.volume_and_centroid[0], 0.1 * 0.08 * 0.08)
-    check_solid(moved_face(solid, low, 0.0399).solid)
+    for height, faces in ((0.039, 8), (0.04, 6), (0.06, 8)):
+        change = moved_face(solid, low, height)
+        check_solid(change.solid)
+        assert len(change.solid.faces) == faces
+        assert_allclose(change.solid.volume_and_centroid[0], 0.05 * 0.08 * (0.08 + 0.04 + height))
+    raised = change.came_from.index(low)
+    assert_allclose(change.solid.offsets[raised], solid.offsets[low] + 0.06)
+    assert set(change.came_from) == set(range(8)) and len(change.came_from) == 8
+    with pytest.raises(BadInput, match=r"the limit is 39\.[89]"):
+        moved_face(solid, low, -0.06)
 
 
-def test_walls_that_would_meet_are_refused_before_they_do():
+def test_walls_that_meet_fill_the_slot_and_go_no_farther():
     u = prism(np.array([[0, 0], [0.1, 0], [0.1, 0.06], [0.07, 0.06], [0.07, 0.02], [0.03, 0.02], [0.03, 0.06], [0, 0.06]]), 0.05)
     inner = face(u, (0.03, 0.04, 0.025), (1, 0, 0))
     check_solid(moved_face(u, inner, 0.0395).solid)
-    for distance in (0.04, 0.05):
-        with pytest.raises(BadInput, match=r"(the limit is 39\.[89])"):
-            moved_face(u, inner, distance)
+    assert len(moved_face(u, inner, 0.04).solid.faces) == 6
+    with pytest.raises(BadInput, match=r"the limit is 39\.[89]"):
+        moved_face(u, inner, 0.05)
 
 
 def test_edges_and_corners_go_where_they_are_dragged_and_right_angles_stay():

@@ -64,11 +64,42 @@ def test_faces_that_are_meant_to_be_flush_are(gap):
     assert len(combined(BASE, at((0.1, 0.08, 0.04), (0, 0, 0.04 + gap)), "join").faces) == 6
 
 
+@settings(max_examples=25)
+@given(st.integers(0, 10_000))
+def test_flush_bodies_meet_wherever_they_stand(seed):
+    """Bodies on a grid of 10 mm, so that faces, edges and corners coincide, turned anywhere: the same as on the grid."""
+    rng = np.random.default_rng(seed)
+    T = from_xyz_rpy(rng.uniform(-0.3, 0.3, 3), rng.uniform(-3, 3, 3))
+    straight = turned = None
+    for _ in range(4):
+        low = rng.integers(0, 4, 3)
+        size = rng.integers(1, 4, 3)
+        body = at(0.01 * size, 0.01 * (low + 0.5 * size))
+        how = "join" if straight is None else ("join", "join", "cut")[rng.integers(3)]
+        straight, reason = outcome(straight, body, how)
+        turned, reason_turned = outcome(turned, Polyhedron(apply(T, body.vertices), body.faces), how)
+        assert (reason is None) == (reason_turned is None), (reason, reason_turned)
+        assert len(straight.faces) == len(turned.faces) and len(straight.vertices) == len(turned.vertices)
+        assert_allclose(turned.volume_and_centroid[0], straight.volume_and_centroid[0], rtol=1e-9)
+        assert_allclose(apply(T, straight.volume_and_centroid[1]), turned.volume_and_centroid[1], atol=1e-9)
+        check_solid(turned)
+
+
+def outcome(solid: Polyhedron | None, body: Polyhedron, how: str) -> tuple[Polyhedron, str | None]:
+    """The solid after a boolean, or as it was with the reason."""
+    if solid is None:
+        return body, None
+    try:
+        return combined(solid, body, how), None
+    except BadInput as error:
+        return solid, str(error)
+
+
 @pytest.mark.parametrize(
     ("tool", "how", "match"),
     [
         (at((0.05, 0.05, 0.05), (0.1, 0.2, 0)), "join", "do not touch, they are 137.3 mm apart"),
-        (at((0.05, 0.05, 0.05), (0.075, 0.065, 0)), "join", "would leave 2 separate bodies"),
+        (at((0.05, 0.05, 0.05), (0.075, 0.065, 0)), "join", "only touch along an edge at"),
         (at((0.02, 0.02, 0.02), (0, 0, 0)), "join", "wholly inside the solid; nothing would change"),
         (at((0.02, 0.02, 0.02), (0, 0, 0)), "cut", "a hollow of 8 cm³ inside"),
         (at((0.02, 0.2, 0.2), (0, 0, 0)), "cut", "2 separate bodies, of 128 cm³ and 128 cm³"),
