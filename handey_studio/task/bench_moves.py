@@ -71,7 +71,7 @@ def _row(seed: int, pile: Pile, library: Library) -> dict[str, Any]:
     outcome = run_move(station, cell, MoveCommand(pile.part, pile.to), MoveOptions(seed=seed), recovery=once)
     scene, result = outcome.scene, outcome.result
     total = time.perf_counter() - begun
-    off = _off(pile, station, cell) if result.status == "done" else (None, None)
+    off = off_truth(pile, station, cell) if result.status == "done" else (None, None)
     wrong = judge(scene, result.plan, before, robot) if scene is not None and result.plan is not None else None
     return {
         "seed": seed,
@@ -111,7 +111,7 @@ def _as_true(placed: PlacedPart, bodies: tuple[SolidBody, ...]) -> NDArray:
     return min(poses, key=lambda T: min(sum(pose_difference(T, body.T_world_body)) for body in bodies if not body.fixed))
 
 
-def _off(pile: Pile, station: Station, cell: SimulatedCell) -> tuple[float, float]:
+def off_truth(pile: Pile, station: Station, cell: SimulatedCell) -> tuple[float, float]:
     """How far the part truly stands from where it was commanded, in mm and degrees, up to its symmetries."""
     truth = cell.true_pose(pile.part)
     differences = [pose_difference(truth @ S, pile.T_world_goal) for S in station.models[pile.part].symmetries]

@@ -56,9 +56,13 @@ def hold_of(cell: Cell, held: Held, T_world_hand: NDArray) -> Hold:
     return Hold(cell.opening(), cell.finger_force(), -float(wrench.force_N[2]), _lever(wrench, held, T_world_hand))
 
 
-def still_held(cell: Cell, held: Held, T_world_hand: NDArray, before: Hold, closing: float, step: int) -> Incident | None:
+def lifted(now: Hold, width: float, hand: Hand) -> Hold:
+    """What a part of a width [m] should feel like after the lift: pressed with the hand's force, and as heavy as it turns out to be."""
+    return Hold(width, hand.force, now.weight, now.lever)
+
+
+def still_held(now: Hold, before: Hold, closing: float, physics: bool, step: int) -> Incident | None:
     """During the carry: width, force, weight and centre of mass against those `before`; `closing` [m] is where empty fingers go."""
-    now, physics = hold_of(cell, held, T_world_hand), cell.physics
     change = abs(now.width - before.width)
     if now.width < closing + WIDTH_CHANGE_M < before.width:
         return Incident("dropped", step, "nothing is between the fingers any more; they closed by", change, WIDTH_CHANGE_M, "m")

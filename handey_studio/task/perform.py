@@ -17,6 +17,7 @@ from handey_studio.task.noticing import (
     closed_on,
     fingers_went,
     hold_of,
+    lifted,
     not_arrived,
     still_held,
 )
@@ -25,7 +26,7 @@ from handey_studio.task.plan import Carry, MovePlan, Step
 from handey_studio.world import Held, Part, World, arm_of
 
 GUARDED_SLOWER = 4.0  # guarded descents are so much slower than the plan: what they meet is met gently
-OPEN_TRIES, OPEN_PAUSE_S = 3, 1.0  # fingers that stick are sent again after a pause
+TRIES, PAUSE_S = 4, 1.5  # what sticks or is blocked is tried again after a pause: some hindrances go by themselves
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,25 +98,19 @@ class Performer:
         if fingers_only(step):
             return self.let_go(number, float(step.hand_opening_m[-1]), step.kind)
         moved = self.acting.follow(number, step.kind, motion_of(step))
-        held, T_world_hand = self.task.held(carry), self.acting.hand_now()
-        lost = None
-        if step.held and self._hold is not None:
-            lost = still_held(self.cell, held, T_world_hand, self._hold, closing(carry), number)
-        elif step.held:
-            self._hold = hold_of(self.cell, held, T_world_hand)
-            lost = closed_on(Moved("contact", moved.recording), carry.grasp.width, number)
-        if lost is not None and lost.kind in ("dropped", "missed"):
-            self.holding = False
-        return not_arrived(moved, step.q_rad[-1], number, step.kind) or lost
+        return not_arrived(moved, step.q_rad[-1], number, step.kind) or (self._lost(number, carry) if step.held else None)
+
+    def _lost(self, number: int, carry: Carry) -> Incident | None:
+        """Whether the part that is carried left the fingers or moved in them; after the lift it is felt for the first time."""
+        now = hold_of(self.cell, self.task.held(carry), self.acting.hand_now())
+        before, self._hold = self._hold or lifted(now, carry.grasp.width, self.task.carried.robot.hand), now
+        lost = still_held(now, before, closing(carry), self.cell.physics, number)
+        self.holding = lost is None or lost.kind != "dropped"
+        return lost
 
     def _place(self, number: int, step: Step, carry: Carry) -> Incident | None:
         """Descend until contact, a little beyond the commanded pose if need be, then let the part come to rest on its support."""
         held = self.task.held(carry)
-        if self._hold is not None:
-            lost = still_held(self.cell, held, self.acting.hand_now(), self._hold, closing(carry), number)
-            if lost is not None:
-                self.holding = lost.kind != "dropped"
-                return lost
         moved = self.acting.descend(number, "place", motion_of(step, GUARDED_SLOWER))
         if moved.ended == "arrived":
             moved = self._deeper(number, step, carry, held) or moved
@@ -145,9 +140,9 @@ class Performer:
     def let_go(self, number: int, opening: float, what: str = "open") -> Incident | None:
         """Fingers out to an opening [m]; those that stick are sent again after a pause."""
         hand, stuck = self.task.carried.robot.hand, None
-        for count in range(OPEN_TRIES):
+        for count in range(TRIES):
             if count:
-                self.acting.wait(number, OPEN_PAUSE_S)
+                self.acting.wait(number, PAUSE_S)
             incident = fingers_went(self.acting.grip(number, what, opening), opening, hand, number)
             if incident is None:
                 self.incidents += [replace(stuck, overcome=True)] if stuck else []

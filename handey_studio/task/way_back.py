@@ -3,17 +3,18 @@
 The way that the arm came by was free, so it goes back the same way; only from where it let the part fall it looks for a new one.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Progress, Silent
-from handey_studio.cell.protocol import CannotAct
+from handey_studio.cell.protocol import CannotAct, Moved
 from handey_studio.motion import PathOptions, Trajectory, plan_path, time_path
 from handey_studio.task.acting import WAY_BACK, fingers_only
 from handey_studio.task.noticing import not_arrived
-from handey_studio.task.perform import GUARDED_SLOWER, Performer
+from handey_studio.task.perform import GUARDED_SLOWER, PAUSE_S, TRIES, Performer
 from handey_studio.task.performance import Incident
 from handey_studio.task.plan import Step
 from handey_studio.world import World
@@ -46,13 +47,7 @@ def _put_back(performer: Performer, step: int, actions: list[str]) -> Incident |
         return Incident("hand stuck", WAY_BACK, "the fingers do not let go of the part; the arm stays where it is")
     taken = next(k for k in range(step, -1, -1) if steps[k].kind == "close")
     for k in range(step, taken, -1):
-        motion = _reversed(steps[k], performer.cell.joints())
-        if steps[k].kind == "lift":
-            slow = replace(motion, time_s=motion.time_s * GUARDED_SLOWER)
-            moved = performer.acting.descend(WAY_BACK, "put back", slow)
-        else:
-            moved = performer.acting.follow(WAY_BACK, f"{steps[k].kind}, backwards", motion)
-        stopped = not_arrived(moved, steps[k].q_rad[0], WAY_BACK, f"{steps[k].kind}, backwards")
+        stopped = _backwards(performer, steps[k], guarded=steps[k].kind == "lift")
         if stopped is not None:
             return stopped
     actions.append("the part is put back where it was taken up")
@@ -80,10 +75,7 @@ def _back_along(performer: Performer, step: int, actions: list[str]) -> Incident
     for k in range(step, carry.first_step - 1, -1):
         if fingers_only(steps[k]):
             continue
-        motion = _reversed(steps[k], performer.cell.joints())
-        motion = replace(motion, hand_opening_m=np.full(len(motion.time_s), performer.cell.opening()))
-        moved = performer.acting.follow(WAY_BACK, f"{steps[k].kind}, backwards", motion)
-        stopped = not_arrived(moved, steps[k].q_rad[0], WAY_BACK, f"{steps[k].kind}, backwards")
+        stopped = _backwards(performer, steps[k])
         if stopped is not None:
             return stopped
     actions.append("the arm goes back the way it came")
@@ -98,15 +90,42 @@ def _home(performer: Performer, step: int, world: World, actions: list[str], pro
         return None
     ended = performer.task.plan.steps[step]
     if ended.kind == "free" and np.abs(q - ended.q_rad[-1]).max() > 1e-3:
-        acting.follow(WAY_BACK, "free, backwards", _reversed(ended, q))
+        stopped = _backwards(performer, ended)
+        if stopped is not None:
+            return stopped
         q = performer.cell.joints()
     opening = performer.cell.opening()
     path = plan_path(world, q, start, opening, options=PathOptions(), rng=np.random.default_rng(0), progress=progress)
     if not path.found:
         return Incident("blocked", WAY_BACK, f"no way home is known: {path.reason}")
-    moved = acting.follow(WAY_BACK, "home", time_path(world.robot, path, opening))
     actions.append("the arm goes home another way")
-    return not_arrived(moved, start, WAY_BACK, "home")
+    return _patiently(performer, "home", lambda: acting.follow(WAY_BACK, "home", time_path(world.robot, path, opening)), start)
+
+
+def _backwards(performer: Performer, step: Step, guarded: bool = False) -> Incident | None:
+    """The arm goes a step's way back to its beginning, with the fingers as they are; `guarded` down to where it touches."""
+
+    def go() -> Moved:
+        way = _reversed(step, performer.cell.joints())
+        motion = replace(way, hand_opening_m=np.full(len(way.time_s), performer.cell.opening()))
+        if guarded:
+            return performer.acting.descend(WAY_BACK, what, replace(motion, time_s=motion.time_s * GUARDED_SLOWER))
+        return performer.acting.follow(WAY_BACK, what, motion)
+
+    what = f"{step.kind}, backwards"
+    return _patiently(performer, what, go, step.q_rad[0])
+
+
+def _patiently(performer: Performer, what: str, go: Callable[[], Moved], q: NDArray) -> Incident | None:
+    """A motion to `q` (joints,) [rad], tried again after a pause when it is blocked."""
+    stopped = None
+    for count in range(TRIES):
+        if count:
+            performer.acting.wait(WAY_BACK, PAUSE_S)
+        stopped = not_arrived(go(), q, WAY_BACK, what)
+        if stopped is None or stopped.kind == "stopped":
+            break
+    return stopped
 
 
 def _reversed(step: Step, q: NDArray) -> Trajectory:
