@@ -59,7 +59,7 @@ def random_pile(seed: int, part: str, library: Library, robot: str = "ur5", opti
         if target is None or not _fits(workcell, bodies, target, options) or not graspable(hand, target, bodies):
             continue
         T_goal = _goal(workcell, target, rng, options)
-        setup = SimulatedSetup(tuple(_true_body(body, part) for body in bodies if not body.fixed), seed=seed)
+        setup = SimulatedSetup(tuple(_true_body(body, part) for body in bodies if not body.fixed), seed=seed, physics=False)
         return Pile(_with(workcell, setup), part, destination(T_goal), T_goal, attempt)
     raise BadInput(f'no pile around part "{part}" with seed {seed} shows it and leaves room for the hand in {options.attempts} attempts.')
 

@@ -73,7 +73,7 @@ def solvable_move(
         bodies = _cluttered(workcell, model, arm_robot, T_start, T_goal, hands, rng, options)
         if bodies is None:
             continue
-        setup = SimulatedSetup(tuple(_true_body(body, part) for body in bodies if not body.fixed), seed=seed)
+        setup = SimulatedSetup(tuple(_true_body(body, part) for body in bodies if not body.fixed), seed=seed, physics=False)
         cell = Workcell(robot, (part,), workcell.blocks, workcell.free_space, workcell.table_z, workcell.finder, setup)
         return Pile(cell, part, destination(T_goal), T_goal, attempt)
     raise BadInput(f'no MOVE of part "{part}" with seed {seed} came out solvable in {options.attempts} attempts.')

@@ -41,7 +41,7 @@ class SimulatedSetup(Value):
     bodies: tuple[TrueBody, ...] = ()
     drop: bool = False
     seed: int = 0
-    physics: bool = False
+    physics: bool = True
     faults: tuple[Fault, ...] = ()
     T_range_offset: NDArray = field(default_factory=lambda: np.eye(4))
     held: str | None = None
