@@ -29,11 +29,12 @@ Pairs = tuple[tuple[int, int], ...]
 @dataclass(frozen=True)
 class AlignOptions:
     """Poses are compared by the worth of the planes that they bring together, less `open_cost` times the share of the readings that would
-    then hang in the open; with more than `most_open` of them a pose falls. One that reaches `rival` of the best one's value is told too."""
+    then hang in the open; with more than `most_open` of them a pose falls. One that reaches `rival` of the best one's value is told
+    too: nothing that was read speaks against it."""
 
     open_cost: float = 1.5
     most_open: float = 0.06
-    rival: float = 0.9
+    rival: float = 0.5
 
 
 class Shared(NamedTuple):

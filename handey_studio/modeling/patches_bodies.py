@@ -23,26 +23,28 @@ def creases_of(view: DepthView, points: NDArray, labels: NDArray, planes: NDArra
     with np.errstate(divide="ignore"):
         reach = (NEAR_SIGMAS * sigma + NEAR_PX / np.asarray(view.projection.pixels_per_metre(view.depth))).ravel()
     count, number = len(planes), np.arange(labels.size).reshape(labels.shape)
-    beside = np.zeros((count, count), dtype=int)
+    beside, flank = np.zeros((count, count), dtype=int), np.zeros((count, count, 3))
     for step in range(1, GAP_PX + 1):
         for one, two in ((np.s_[:, step:], np.s_[:, :-step]), (np.s_[step:], np.s_[:-step])):
             differ = (labels[one] != labels[two]) & (labels[one] >= 0) & (labels[two] >= 0)
             i, j = number[one][differ], number[two][differ]
             met = np.linalg.norm(points[i] - points[j], axis=1) < reach[i] * (1.0 + 0.3 * (step - 1))
-            np.add.at(beside, (labels.ravel()[i[met]], labels.ravel()[j[met]]), 1)
+            a, b = labels.ravel()[i[met]], labels.ravel()[j[met]]
+            np.add.at(beside, (a, b), 1)
+            np.add.at(flank, (a, b), points[i[met]])
+            np.add.at(flank, (b, a), points[j[met]])
     total = beside + beside.T
-    middles = np.array([points[labels.ravel() == k].mean(axis=0) for k in range(count)])
     return tuple(
-        Crease(a, b, _is_convex(planes, middles, a, b), int(total[a, b]))
+        Crease(a, b, _is_convex(planes, flank[a, b] / total[a, b], flank[b, a] / total[a, b], a, b), int(total[a, b]))
         for a in range(count)
         for b in range(a + 1, count)
         if total[a, b] >= LEAST_READINGS
     )
 
 
-def _is_convex(planes: NDArray, middles: NDArray, a: int, b: int) -> bool:
-    """Whether each patch lies behind the other's plane."""
-    behind = planes[a, 3] - middles[b] @ planes[a, :3] + planes[b, 3] - middles[a] @ planes[b, :3]
+def _is_convex(planes: NDArray, beside_a: NDArray, beside_b: NDArray, a: int, b: int) -> bool:
+    """Whether the readings (3,) of each patch beside the crease lie behind the other's plane."""
+    behind = planes[a, 3] - beside_b @ planes[a, :3] + planes[b, 3] - beside_a @ planes[b, :3]
     return bool(behind > 0)
 
 

@@ -17,6 +17,7 @@ LEAST_HOLE = 0.3  # of a hole's pixels must be seen on other things
 LEAST_HOLE_PX = 40
 SIMPLE_PX, RAGGED = 1.5, 1.2  # a contour's side may leave a straight line by so much, and by this share of the outline error
 COARSER = (1.0, 1.6, 2.5)  # times as much where the sides would cross one another
+LEAST_SIDE_PX, SAME_LINE = 0.3, np.cos(np.deg2rad(1.0))
 SHORT = 3.5  # slacks: a shorter side may be a rounded corner
 MEET_SLACKS, MEET_PX = 6.0, 8.0  # lines that meet farther from their corner do not make it
 TRIM = 0.12  # of a side at each end belongs to the corner
@@ -87,12 +88,30 @@ def _polygon(
         inside = _trimmed(a, b, len(contour))
         sides.append(side_of(seen, number, contour[inside], beyond[0][inside], beyond[1][inside]))
     sides, places = moved_out(sides, seen.lost_m * pixels_per_m, pixels_per_m), contour[corners]
-    while (short := _needless(sides, places, slack)) is not None:
-        sides.pop(short)
-        places = np.delete(places, short, axis=0)
-    if len(sides) < 3:
-        return None
-    return Outline(lifted(seen, number, _met(sides, places, slack)), tuple(side.border for side in sides))
+    while len(sides) > 2:
+        corners = _met(sides, places, slack)
+        drop = next((k for k in (_repeated(sides), _needless(sides, places, slack), _pointless(corners)) if k is not None), None)
+        if drop is None:
+            return Outline(lifted(seen, number, corners), tuple(side.border for side in sides))
+        sides.pop(drop)
+        places = np.delete(places, drop, axis=0)
+    return None
+
+
+def _repeated(sides: list[Side]) -> int | None:
+    """A side on the same crease as the one before."""
+    for k, side in enumerate(sides):
+        before = sides[k - 1]
+        same = side.border.kind in ("crease", "foot") and (before.border.kind, before.border.other) == (side.border.kind, side.border.other)
+        if same and abs(before.along @ side.along) > SAME_LINE:
+            return k
+    return None
+
+
+def _pointless(corners: NDArray) -> int | None:
+    """A side without length."""
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    return int(np.argmin(lengths)) if lengths.min() < LEAST_SIDE_PX else None
 
 
 def _needless(sides: list[Side], places: NDArray, slack: float) -> int | None:
