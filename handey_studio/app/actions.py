@@ -27,6 +27,7 @@ from handey_studio.session import (
     session_to_bytes,
     write_session,
 )
+from handey_studio.task.plan import MoveCommand
 from handey_studio.world.library import bundled
 
 log = logging.getLogger(__name__)
@@ -138,10 +139,11 @@ class StartMove:
         state = bench.state
         if state.job is not None:
             raise BadInput("the planner is at work; cancel first or wait for it.")
-        if state.command is None:
+        command = state.command
+        if command is None:
             raise BadInput("choose a part to move first.")
         state = JobStarted(self.execute).apply(state)
-        bench.planner.order(state.jobs, state.session, state.library, self.execute)
+        bench.planner.order(state.jobs, alone(state.session, command), state.library, self.execute)
         return state
 
 
@@ -183,6 +185,13 @@ class Follow:
         if np.linalg.norm(view.camera_look_at - here) < NEAR_M and np.linalg.norm(there - here) > 0.0:
             bench.look(view.camera_position + there - here, view.camera_look_at + there - here, self.client)
         return after
+
+
+def alone(session: Session, command: MoveCommand) -> Session:
+    """The session as if this were its only command, with the plan that was made for it if that is what is looked at."""
+    last = session.results[-1:]
+    planned = last if last and last[0].status == "planned" and last[0].command == command else ()
+    return replace(session, commands=(command,), states=(), results=planned)
 
 
 def middle_of(state: State, hypothesis: Hypothesis) -> NDArray:

@@ -22,6 +22,8 @@ from handey_studio.app.modelling.clicks import click_taken_back
 from handey_studio.app.state import State, redone, undone, with_robot, with_view
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import is_rigid
+from handey_studio.session.checks import MAX_ATTEMPTS, MAX_IMPROVE
+from handey_studio.session.command_list import with_commands
 from handey_studio.session.destination import check_command, destination_pose, destinations_on_parts, snapped
 from handey_studio.session.ledger_tree import ROOT, children_of, path_to
 from handey_studio.session.looking import edge_at, hypotheses_at
@@ -99,6 +101,26 @@ class SetSeed:
         if not 0 <= self.seed < 2**31:
             raise BadInput(f"the seed is {self.seed}; it must be a whole number from 0 to {2**31 - 1}.")
         return state.changed("set seed", replace(state.session, seed=self.seed))
+
+
+@dataclass(frozen=True)
+class SetAttempts:
+    """How often a MOVE is tried, the first time among them."""
+
+    attempts: int
+
+    def apply(self, state: State) -> State:
+        return state.changed("set attempts", replace(state.session, attempts=min(max(1, self.attempts), MAX_ATTEMPTS)))
+
+
+@dataclass(frozen=True)
+class SetImprove:
+    """How many more plans are looked at once there is one."""
+
+    improve: int
+
+    def apply(self, state: State) -> State:
+        return state.changed("look for a better plan", replace(state.session, improve=min(max(0, self.improve), MAX_IMPROVE)))
 
 
 @dataclass(frozen=True)
@@ -348,4 +370,6 @@ def _with_command(state: State, label: str, command: MoveCommand) -> State:
     """The MOVE set up anew; whoever sets it up looks at its ghost, no longer at a hypothesis."""
     check_command(state.session, command)
     session = with_view(state, hypothesis=-1).session
-    return state.changed(label, replace(session, commands=(*session.commands[:-1], command)))
+    commands = list(session.commands) or [command]
+    commands[state.command_number] = command
+    return state.changed(label, with_commands(session, tuple(commands)))

@@ -37,6 +37,8 @@ def next_step(state: State) -> tuple[str, str, str]:
     if result.reason == CANCELLED:
         return "Cancelled", "What was found so far is shown. Press Plan or MOVE to start again.", "quiet"
     if result.status == "failed":
+        if result.performances:
+            return "It was not done", f"{result.reason} What happened is told on the right, under Result.", "bad"
         return "No plan was found", f"{result.reason} The ledger tells what was tried; another destination may do.", "bad"
     if result.status == "planned":
         return "Planned: look before it moves", "Play or scrub the timeline. MOVE carries it out.", "good"

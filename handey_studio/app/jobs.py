@@ -4,10 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from handey_studio.app.state import Job, State, with_view
-from handey_studio.session import Session
+from handey_studio.session import CommandState, Session
 from handey_studio.session.ledger_tree import ROOT
+from handey_studio.session.sequence import states_of
 from handey_studio.task.plan import MoveResult
 
+KINDS = {"planned": "planned", "done": "good", "failed": "bad"}  # of notices
 CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
 
 
@@ -33,7 +35,9 @@ class JobShows:
     def apply(self, state: State) -> State:
         if state.job is None or state.job.number != self.number:
             return state
-        return replace(state, session=merged(state.session, self.session), playing=False)
+        grown = bool(self.session.states) and len(self.session.results) > len(state.session.results)
+        state = replace(state, session=merged(state.session, self.session), playing=False)
+        return at_the_end(state) if grown else state
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +58,7 @@ class JobDone:
         result = session.result
         if result is None:
             return state
-        kind = "good" if result.status != "failed" else "info" if result.reason == CANCELLED else "bad"
+        kind = KINDS[result.status] if result.reason != CANCELLED else "info"
         return replace(state, playing=state.replay is not None).told(outcome(result), kind)
 
 
@@ -84,15 +88,33 @@ class JobStarted:
         return replace(state, jobs=state.jobs + 1, playing=False, job=job)
 
 
+def at_the_end(state: State) -> State:
+    """Looking at the end of the last result's last attempt, where the cell is now."""
+    state = with_view(state, result=-1, attempt=-1)
+    return with_view(state, time_s=state.replay.duration if state.replay is not None else 0.0)
+
+
 def merged(shown: Session, found: Session) -> Session:
     """What the planner found put into the session on screen, whose settings may have changed meanwhile.
 
     A scene that came once more stays the one that is shown; of a new one nothing is looked at yet.
     """
+    results, states = (found.results, found.states) if found.states else _beside(shown, found)
+    shown = replace(shown, results=results, states=states, cell_now=found.cell_now)
     if found.scene == shown.scene:
-        return replace(shown, results=found.results, cell_now=found.cell_now)
-    view = replace(shown.view, hypothesis=-1, edge=-1)
-    return replace(shown, scene=found.scene, results=found.results, cell_now=found.cell_now, view=view)
+        return shown
+    return replace(shown, scene=found.scene, view=replace(shown.view, hypothesis=-1, edge=-1))
+
+
+def _beside(shown: Session, found: Session) -> tuple[tuple[MoveResult, ...], tuple[CommandState, ...]]:
+    """What came of a single command, put to the results of a list that is being run, if one is."""
+    kept = shown.results[: 1 + max((state.result for state in shown.states), default=-1)]
+    states, last = list(states_of(shown)), found.results[-1] if found.results else None
+    if last is not None and last.performances and last.command in shown.commands:
+        done = CommandState("done" if last.status == "done" else "failed", len(kept) + len(found.results) - 1)
+        states[shown.commands.index(last.command)] = done
+    begun = any(state.result >= 0 or state.status == "skipped" for state in states)
+    return (*kept, *found.results), tuple(states) if begun else ()
 
 
 def outcome(result: MoveResult) -> str:

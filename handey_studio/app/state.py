@@ -8,10 +8,12 @@ from pathlib import Path
 from handey_studio.app.grasp_look import GraspLook
 from handey_studio.app.modelling.look import ModelLook
 from handey_studio.base import Entry
+from handey_studio.cell.faults import Fault
 from handey_studio.localization import Hypothesis
 from handey_studio.localization.explain import Explanation
 from handey_studio.modeling.draft import Draft
 from handey_studio.session import Moment, Replay, Session, Told, attempts_of, replay_of
+from handey_studio.session.command_list import with_commands
 from handey_studio.session.handling import Handling
 from handey_studio.session.ledger_tree import ROOT
 from handey_studio.task.performance import Performance
@@ -24,19 +26,28 @@ MAX_UNDO = 100
 
 @dataclass(frozen=True)
 class Settings:
-    """What the user sets and can take back: the MOVE commands, the seed, the robot and the part that is being modelled."""
+    """What the user sets and can take back: the MOVE commands, how they are planned and tried, the robot, whether the simulated cell obeys
+    forces and what goes wrong in it on purpose, where the range finder is taken to stand, and the part that is being modelled."""
 
     commands: tuple[MoveCommand, ...]
     seed: int
     robot: str
     draft: Draft | None = None
+    attempts: int = 3
+    improve: int = 0
+    physics: bool = False
+    faults: tuple[Fault, ...] = ()
 
     @classmethod
     def of(cls, session: Session) -> "Settings":
-        return cls(session.commands, session.seed, session.workcell.robot, session.draft)
+        workcell = session.workcell
+        how = session.attempts, session.improve, workcell.setup.physics, workcell.setup.faults
+        return cls(session.commands, session.seed, workcell.robot, session.draft, *how)
 
     def put_into(self, session: Session) -> Session:
-        return with_robot(replace(session, commands=self.commands, seed=self.seed, draft=self.draft), self.robot)
+        session = replace(with_commands(session, self.commands), seed=self.seed, draft=self.draft)
+        session = replace(session, attempts=self.attempts, improve=self.improve)
+        return with_robot(with_disturbances(session, self.physics, self.faults), self.robot)
 
 
 def with_robot(session: Session, robot: str) -> Session:
@@ -45,6 +56,16 @@ def with_robot(session: Session, robot: str) -> Session:
         return session
     view = replace(session.view, time_s=0.0, result=-1)
     return replace(session, workcell=replace(session.workcell, robot=robot), results=(), view=view)
+
+
+def with_disturbances(session: Session, physics: bool, faults: tuple[Fault, ...]) -> Session:
+    """The session whose simulated cell obeys forces or not, and in which this goes wrong on purpose; its bodies stay where they are."""
+    before = session.workcell.setup
+    if (before.physics, before.faults) == (physics, faults):
+        return session
+    now = None if session.cell_now is None else replace(session.cell_now, physics=physics, faults=faults)
+    workcell = replace(session.workcell, setup=replace(before, physics=physics, faults=faults))
+    return replace(session, workcell=workcell, cell_now=now)
 
 
 @dataclass(frozen=True)
@@ -75,7 +96,7 @@ class Notice:
 
     number: int
     text: str
-    kind: str = "info"  # info, good or bad
+    kind: str = "info"  # info, planned, good or bad
     client: int | None = None
 
 
@@ -102,6 +123,7 @@ class State:
 
     `ledger_at` is the entry whose branches are listed, page by page, `ledger_entry` the one that is looked at; `ROOT` is none.
     `hypothesis_part`, `hypothesis_verdict` and `edge_min_m` narrow down what of the localizer's work is looked at.
+    `chosen` is the place in the list of the command that is set up, -1 for the last.
     """
 
     library: Library
@@ -131,6 +153,7 @@ class State:
     handled: Handled | None = None
     grasp_look: GraspLook = field(default_factory=GraspLook)
     model: ModelLook = field(default_factory=ModelLook)
+    chosen: int = -1
     loads: int = field(default=0)
 
     @property
@@ -208,8 +231,14 @@ class State:
 
     @property
     def command(self) -> MoveCommand | None:
-        """The MOVE that is set up."""
-        return self.session.commands[-1] if self.session.commands else None
+        """The MOVE that is set up: the one of the list that is chosen."""
+        return self.session.commands[self.command_number] if self.session.commands else None
+
+    @property
+    def command_number(self) -> int:
+        """Its place in the list, the last unless another was chosen."""
+        count = len(self.session.commands)
+        return self.chosen if 0 <= self.chosen < count else count - 1
 
     def told(self, text: str, kind: str = "info", client: int | None = None) -> "State":
         """With one more sentence for the user."""
@@ -277,4 +306,5 @@ def _replay(robot: Robot, plan: MovePlan, performance: Performance | None) -> Re
 def _kept(session: Session) -> tuple:
     """What makes a session worth saving. Arrays are compared by identity: they never change."""
     found = id(session.scene), tuple(map(id, session.results))
-    return session.name, id(session.workcell), session.commands, session.seed, id(session.draft), found
+    how = session.seed, session.attempts, session.improve
+    return session.name, id(session.workcell), session.commands, session.states, how, id(session.draft), found

@@ -159,7 +159,7 @@ def _marks(replay: PerformedReplay) -> str:
             share = (performed.start_s + event.time_s) / max(replay.duration, 1e-9)
             number = f" {event.force_N:.0f} N" if share - last > LEAST_APART else ""
             last = share if number else last
-            sign = "▼" if event.what == "touch" else "△"
+            sign = "△" if event.what == "release" else "▼"
             side = f"right:{100 * (1 - share):.2f}%" if share > 0.9 else f"left:{100 * share:.2f}%"
             said = html.esc(f"{event.what} at {performed.start_s + event.time_s:.2f} s, {event.force_N:.1f} N")
             told.append(f'<span title="{said}" style="position:absolute;{side};transform:translateX(-3px)">{sign}{number}</span>')

@@ -6,6 +6,7 @@ import viser
 
 from handey_studio.app import palette
 from handey_studio.app.modelling.aside import aside
+from handey_studio.app.panels.cell import CellPanel
 from handey_studio.app.panels.edges import EdgesPanel
 from handey_studio.app.panels.findings import PathPanel, ResultPanel
 from handey_studio.app.panels.grasp import GraspPanel
@@ -78,17 +79,19 @@ class View:
 
 def _left(gui: viser.GuiApi, send: Send) -> list[Any]:
     panel = gui.add_panel()
-    with panel.add_tab("Model", viser.Icon.CUBE):
+    with panel.add_tab("Model"):
         model = ModelPanel(gui, send)
-    with panel.add_tab("Move", viser.Icon.ROBOT):
+    with panel.add_tab("Move"):
         move = MovePanel(gui, send)
-    with panel.add_tab("View", viser.Icon.EYE):
+    with panel.add_tab("View"):
         looking = LookingPanel(gui, send)
-    with panel.add_tab("Edges", viser.Icon.LINE):
+    with panel.add_tab("Edges"):
         edges = EdgesPanel(gui, send)
+    with panel.add_tab("Cell"):
+        cell = CellPanel(gui, send)
     panel.dock_left()
     panel.set_width(LEFT_WIDTH)
-    return [model, move, looking, edges]
+    return [model, move, looking, edges, cell]
 
 
 def _right(gui: viser.GuiApi, send: Send) -> list[Any]:

@@ -35,7 +35,12 @@ FRAME_S = 1.0 / 30.0
 IDLE_S = 0.25
 NOTICE_S = 7.0
 FIELD_OF_VIEW_RAD = float(np.deg2rad(40.0))
-NOTICE_LOOKS = {"info": ("Handey Studio", BLUE), "good": ("Done", TEAL), "bad": ("That did not work", VERMILLION)}
+NOTICE_LOOKS = {
+    "info": ("Handey Studio", BLUE),
+    "planned": ("Planned", TEAL),
+    "good": ("Done", TEAL),
+    "bad": ("That did not work", VERMILLION),
+}
 
 
 class Workbench:

@@ -11,7 +11,6 @@ from handey_studio.world import Library
 NAME = "export"
 HELP = "write a planned MOVE for a robot controller, after a dry check against the robot's limits"
 SUFFIXES = {"urscript": ".script", "ros2": ".ros2.json", "csv": ".csv"}
-RATE_HZ = {"urscript": 125.0}  # other formats keep the plan's own samples unless told otherwise
 
 
 def add_arguments(export: argparse.ArgumentParser) -> None:
@@ -25,23 +24,14 @@ def add_arguments(export: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.task.export import GUARDED_SHARE, at_rate, check_program, csv_text, read_program, ros2_json, ros2_yaml, urscript
+    from handey_studio.task.export import program_text, read_program
 
     out = given.out or given.move.with_suffix(SUFFIXES[given.format])
     check_output(out)
     program = read_program(given.move)
     robot = Library.choose(given.library).robot(given.robot or program.robot)
-    check_program(program, robot)
-    rate = given.rate or RATE_HZ.get(given.format)
-    if rate is not None:
-        program = at_rate(program, rate, GUARDED_SHARE if given.format == "urscript" else 1.0)
-        check_program(program, robot)
-    if given.format == "urscript":
-        text = urscript(program, robot, rate or RATE_HZ["urscript"])
-    elif given.format == "csv":
-        text = csv_text(program)
-    else:
-        text = (ros2_yaml if out.suffix in (".yaml", ".yml") else ros2_json)(program, robot)
+    form = "ros2-yaml" if given.format == "ros2" and out.suffix in (".yaml", ".yml") else given.format
+    text, program = program_text(program, robot, form, given.rate)
     try:
         replace_file(out, text.encode())
     except OSError as error:

@@ -7,12 +7,26 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove, StartMove
-from handey_studio.app.commands import POSE_LABEL, ChoosePart, ChooseRobot, FreePose, Redo, ResetCell, SetDestination, SetSeed, Undo
+from handey_studio.app.commands import (
+    POSE_LABEL,
+    ChoosePart,
+    ChooseRobot,
+    FreePose,
+    Redo,
+    ResetCell,
+    SetAttempts,
+    SetDestination,
+    SetImprove,
+    SetSeed,
+    Undo,
+)
 from handey_studio.app.guidance import next_step, stages
+from handey_studio.app.panels.commands import CommandsPanel
 from handey_studio.app.scene.destination import ghost_pose
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
 from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy
+from handey_studio.session.checks import MAX_ATTEMPTS, MAX_IMPROVE
 from handey_studio.session.destination import anywhere, destinations_on_parts
 from handey_studio.task.destination import format_pose
 from handey_studio.task.plan import MoveCommand
@@ -45,6 +59,14 @@ class MovePanel:
             self._seed = gui.add_number("Seed", 0, min=0, max=2**31 - 1, step=1, hint="The same seed gives the same plan")
             self._robot = gui.add_dropdown("Robot", (NO_PART,), hint="The arm in the workcell; what was planned for another goes")
             self._reset = gui.add_button("Reset the cell", icon=viser.Icon.REFRESH, color="gray", hint="As it was before the first MOVE")
+            self._attempts = gui.add_number(
+                "Attempts", 3, min=1, max=MAX_ATTEMPTS, step=1, hint="How often a MOVE is tried after something went wrong"
+            )
+            self._improve = gui.add_number(
+                "Better plan", 0, min=0, max=MAX_IMPROVE, step=1, hint="How many more plans are looked at, to take the quickest"
+            )
+        with gui.add_folder("Commands"):
+            self._commands = CommandsPanel(gui, send)
         gui.add_html(KEYS)
         self._wire(send)
 
@@ -55,6 +77,8 @@ class MovePanel:
         on_user(self._rpy, send, lambda _: self._typed())
         on_user(self._robot, send, lambda event: ChooseRobot(event.target.value))
         on_user(self._seed, send, lambda event: SetSeed(int(event.target.value)))
+        on_user(self._attempts, send, lambda event: SetAttempts(int(event.target.value)))
+        on_user(self._improve, send, lambda event: SetImprove(int(event.target.value)))
         on_click(self._plan, send, lambda _: StartMove(execute=False))
         on_click(self._move, send, lambda _: StartMove(execute=True))
         on_click(self._cancel, send, lambda _: CancelMove())
@@ -67,6 +91,7 @@ class MovePanel:
         return SetDestination(format_pose(T), "type destination")
 
     def render(self, old: State | None, new: State) -> None:
+        self._commands.render(old, new)
         if old is not None and _looks(old) == _looks(new):
             return
         row = html.stage_chips(stages(new.job)) if new.job else ""
@@ -96,6 +121,8 @@ class MovePanel:
             set_to(self._rpy, value=rounded(np.rad2deg(rpy), 2))
         set_to(self._why, content=_about_destination(free, pose is not None, command), visible=not free)
         set_to(self._seed, value=session.seed, disabled=busy)
+        set_to(self._attempts, value=session.attempts, disabled=busy)
+        set_to(self._improve, value=session.improve, disabled=busy)
         robots = tuple(sorted({*state.library.robot_folders(), session.workcell.robot}))
         choose(self._robot, robots, session.workcell.robot, busy)
 
@@ -139,8 +166,8 @@ def _looks(state: State) -> tuple:
     session = state.session
     return (
         state.loads,
-        session.commands,
-        session.seed,
+        state.command,
+        (session.seed, session.attempts, session.improve),
         session.located,
         session.workcell,
         session.result,

@@ -1,0 +1,18 @@
+"""The Cell tab: the outside world, disturbed on purpose and calibrated."""
+
+import viser
+
+from handey_studio.app.panels.disturbing import DisturbingPanel
+from handey_studio.app.state import State
+from handey_studio.app.wire import Send
+
+
+class CellPanel:
+    """One folder each."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        with gui.add_folder("Disturb the cell"):
+            self._disturbing = DisturbingPanel(gui, send)
+
+    def render(self, old: State | None, new: State) -> None:
+        self._disturbing.render(old, new)
