@@ -39,3 +39,8 @@ def test_the_python_example_moves_the_block(capsys):
     told = capsys.readouterr().out
     assert "l_block#1" in told and "planned" in told
     assert told.strip().splitlines()[-1].startswith("[") or "]]" in told, "the pose that was reached"
+
+
+def test_the_modelling_example_builds_a_carton(capsys):
+    exec(compile("\n".join(code("Modelling: a part is its history")), "README.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("(0.00139"), "180 × 119.5 × 65 mm"

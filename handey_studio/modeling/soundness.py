@@ -74,6 +74,7 @@ def checked(solid: Polyhedron) -> Polyhedron:
     ]
     if _groups(around, len(sides)) > len(solid.vertices):
         raise BadInput("the solid would touch itself at a corner; move it apart there, or join it over more than a point.")
+    _check_no_corner_on_an_edge(solid)
     return solid
 
 
@@ -116,6 +117,18 @@ def _check_flat(solid: Polyhedron) -> None:
                 f"two faces at {told_point(corners.mean(axis=0))} would lie within 0.2° of one plane, {measured(float(off), 'm')} apart; "
                 "make them one face or turn them farther."
             )
+
+
+def _check_no_corner_on_an_edge(solid: Polyhedron) -> None:
+    starts, ends = (solid.vertices[[getattr(edge, end) for edge in solid.edges]] for end in ("start", "end"))
+    ways = ends - starts
+    lengths = np.linalg.norm(ways, axis=1)
+    along = np.einsum("vei,ei->ve", solid.vertices[:, None] - starts, ways) / lengths
+    off = np.linalg.norm(solid.vertices[:, None] - starts - along[..., None] * (ways / lengths[:, None]), axis=2)
+    touching = (off < SAME_M) & (along > SAME_M) & (along < lengths - SAME_M)
+    if touching.any():
+        at = told_point(solid.vertices[int(np.argmax(touching.any(axis=1)))])
+        raise BadInput(f"the solid would touch itself at the corner {at}; move it apart there, or join it over more than a point.")
 
 
 def _check_outline(solid: Polyhedron, f: int) -> None:

@@ -146,7 +146,7 @@ def test_changes_that_make_no_sense_are_refused(change, match):
         change(Polyhedron(solid.vertices, tuple(solid.faces[f] for f in order)))
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(st.integers(0, 1000), st.floats(0, 0.004), st.floats(0, 0.1))
 def test_a_face_is_found_again_by_a_rough_reference(seed, off, turn):
     solid = stair()

@@ -52,7 +52,7 @@ def size(draft: Draft) -> np.ndarray:
     return np.ptp(replay(draft).solid.vertices, axis=0)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(st.integers(0, 10_000), st.floats(-3.1, 3.1))
 def test_a_carton_is_three_clicks_and_three_typed_numbers(seed, yaw):
     """As a hand does it: clicks with 1.5 mm of noise on a carton anywhere on the table, then what the ruler says."""
