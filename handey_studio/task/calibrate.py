@@ -4,7 +4,7 @@ The fingers hold the cube by two upright faces, the hand level, so that its uppe
 that looks down sees all of it. The first three poses are the paper's.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
@@ -20,19 +20,16 @@ from handey_studio.sensing.cube_face import CubeFace, find_cube_face
 from handey_studio.sensing.frame_fit import FitOptions, FrameFit, fit_frame
 from handey_studio.sensing.range_calibration import Shown, TablePoint, three_pose_frame
 from handey_studio.sensing.support import support_plane
+from handey_studio.task.calibration_places import SPARE_M, UNDER_M, YAWS_DEG, other_hands, stage_of, three_hands
 from handey_studio.task.run import Station
-from handey_studio.world import Block, Held, Part, World, arm_of
+from handey_studio.world import Block, Held, Part, Robot, World, arm_of
 
 CUBE = "calibration cube"
 STAGE = "calibration"
-SPARE_M = 0.05  # that the range frame may be off before the cube leaves the map
 PLAY_M = 0.005  # that the cube may sit elsewhere in the hand than it is said to
 HOLD_M = 0.02  # the fingers' tips reach so far past the cube's rim
 WIDTH_M = 0.003  # that the fingers' opening may differ from the cube's side
-LOWEST_M, RISE_M, ROOF_M = 0.12, 0.04, 0.03  # of the hand above the table, from the lowest to the highest pose, below the scan's ceiling
-UNDER_M, STANDING_M = 0.02, 0.01  # kept above what stands on the table; lower is the table's own
-YAWS_DEG = (70.0, 110.0, 250.0, 290.0, 20.0, 160.0)  # of the hand: inclined to the map's cells, whose steps then even out along an edge
-PLACES_A_POSE = 3
+STANDING_M = 0.01  # lower is the table's own
 ON_SIGMAS = 3.0
 
 
@@ -100,12 +97,23 @@ def calibrate_range(
     before, ledger = station.workcell.finder.T_world_range, Ledger()
     try:
         table, standing = _look(cell, before, station.workcell.table_z)
-        session = _Showman(station, cell, options, _world(station, standing), table, standing.top, ledger, [])
+        world, held = _world(station, standing), _take(cell, station.robot, options.side_m)
+        session = _Showman(station, cell, options, world, table, standing.top, held, cell.opening(), ledger, [])
         session.show_all(Share(progress, 0.05, 0.95))
         session.come_home(Share(progress, 0.95, 1.0))
     except CannotAct as error:
         return RangeCalibration("failed", str(error), before, ledger=ledger.entries)
     return replace(_answer(session, before, progress), ledger=ledger.entries)
+
+
+def _take(cell: Cell, robot: Robot, side: float) -> Held:
+    """The cube, firmly held: the fingers close on it. For planning it is larger, as nobody knows just where in the hand it is."""
+    ended = cell.grip(max(robot.hand.opening_min, side - WIDTH_M)).ended
+    opening = cell.opening()
+    if ended != "contact" or abs(opening - side) > WIDTH_M:
+        told = f"{1e3 * opening:.1f} mm apart, the cube has {1e3 * side:.1f} ± {1e3 * WIDTH_M:.0f} mm"
+        raise CannotAct(f"the fingers closed until they were {told}; put the cube between them.")
+    return Held(CUBE, Part(CUBE, box((side + 2 * PLAY_M,) * 3)), cube_in_hand(side))
 
 
 class _Standing(NamedTuple):
@@ -156,31 +164,34 @@ class _Showman:
     world: World
     table: TablePoint
     top: float
+    held: Held
+    opening: float
     ledger: Ledger
     showings: list[Showing]
     three: tuple[int, ...] = ()
 
-    def __post_init__(self) -> None:
-        """Closes the fingers firmly on the cube."""
-        side = self.options.side_m
-        ended = self.cell.grip(max(self.station.robot.hand.opening_min, side - WIDTH_M)).ended
-        self.opening = self.cell.opening()
-        if ended != "contact" or abs(self.opening - side) > WIDTH_M:
-            told = f"{1e3 * self.opening:.1f} mm apart, the cube has {1e3 * side:.1f} ± {1e3 * WIDTH_M:.0f} mm"
-            raise CannotAct(f"the fingers closed until they were {told}; put the cube between them.")
-        self.held = Held(CUBE, Part(CUBE, box((side + 2 * PLAY_M,) * 3)), cube_in_hand(side))
-
     def show_all(self, progress: Progress) -> None:
         """The paper's three poses, with the first heading of the hand that allows them all; then others until there are enough."""
+        finder, options = self.station.workcell.finder, self.options
+        stage = stage_of(finder, self.world.table_z, self.top, options.side_m)
         for yaw in YAWS_DEG:
-            seen = [number for hand in self._three(yaw) if (number := self._show(hand, progress)) is not None]
-            if len(seen) == 3:
-                self.three = tuple(seen)
+            if progress.cancelled or self._show_three(three_hands(stage, yaw), progress):
                 break
-        for hand in self._others():
-            if len(self._seen) >= self.options.poses or progress.cancelled:
-                break
+        for hand in other_hands(stage, options.poses, options.seed):
+            if len(self._seen) >= options.poses or progress.cancelled:
+                return
             self._show(hand, progress)
+
+    def _show_three(self, hands: Iterable[NDArray], progress: Progress) -> bool:
+        """The paper's poses, until one fails; whether all came about."""
+        numbers: list[int] = []
+        for hand in hands:
+            number = self._show(hand, progress)
+            if number is None:
+                return False
+            numbers.append(number)
+        self.three = tuple(numbers)
+        return True
 
     @property
     def _seen(self) -> list[Showing]:
@@ -191,41 +202,6 @@ class _Showman:
         self.ledger.adopt(home.entries, parent=self.ledger.add(STAGE, "the way home", home.reason or None))
         if home.found:
             self._follow(home)
-
-    def _three(self, yaw_deg: float) -> Iterator[NDArray]:
-        """A pose, the same moved along the robot's x, and that turned by π; the next one only if the one before was seen."""
-        reach, middle = self._reach()
-        count = len(self._seen)
-        for k, (x, turn) in enumerate(((-reach[0], 0.0), (reach[0], 0.0), (reach[0], 180.0))):
-            if len(self._seen) - count == k:
-                yield self._hand(middle + np.array([x, 0.0, RISE_M / 2]), yaw_deg + turn)
-
-    def _others(self) -> Iterator[NDArray]:
-        """Places all over the map, at several heights, the hand one way and the other."""
-        rng, (reach, middle) = np.random.default_rng(self.options.seed), self._reach()
-        for k in range(PLACES_A_POSE * self.options.poses):
-            place = middle + np.append(rng.uniform(-reach, reach), rng.uniform(0.0, RISE_M))
-            yield self._hand(place, YAWS_DEG[k % 4] + rng.uniform(-10.0, 10.0))
-
-    def _reach(self) -> tuple[NDArray, NDArray]:
-        """How far (2,) [m] along x and y the hand may go from the middle (3,) [m] of what the finder is believed to see, at the lowest."""
-        finder, side = self.station.workcell.finder, self.options.side_m
-        reach = np.array(finder.area) / 2 - side - SPARE_M
-        lowest = max(LOWEST_M, self.top + UNDER_M + side)
-        ceiling = finder.max_height + finder.T_world_range[2, 3] - self.world.table_z - side / 2 - ROOF_M - RISE_M
-        if reach.min() < side / 2 or lowest > ceiling:
-            raise CannotAct(
-                f"there is no room to show a cube of {1e3 * side:.0f} mm: the hand would be {1e3 * lowest:.0f} mm above the table, the "
-                f"range finder sees up to {1e3 * ceiling:.0f} mm, and from the map's middle it could move by {1e3 * reach.min():.0f} mm."
-            )
-        middle = apply(finder.T_world_range, (finder.area[0] / 2, finder.area[1] / 2, 0.0))
-        return reach, np.array([middle[0], middle[1], self.world.table_z + lowest])
-
-    def _hand(self, place: NDArray, yaw_deg: float) -> NDArray:
-        """T_world_hand (4, 4): level, pointing along a heading, the fingers side by side."""
-        z = np.array([np.cos(np.deg2rad(yaw_deg)), np.sin(np.deg2rad(yaw_deg)), 0.0])
-        up = np.array([0.0, 0.0, 1.0])
-        return transform(np.stack([np.cross(up, z), up, z], axis=1), place)
 
     def _show(self, T_world_hand: NDArray, progress: Progress) -> int | None:
         """Go there, scan, look for the face; the showing's number if it was seen. Every failure is in the ledger."""

@@ -46,7 +46,7 @@ def session(library):
 def found(session, library):
     cell = cell_with_cube(session, library, 0.05)
     result = calibrate_range(station_of(session, library), cell, CalibrateOptions(POSES))
-    assert cell.held_truly() == CUBE and np.abs(cell.joints() - station_of(session, library).robot.home).max() < 1e-6
+    assert cell.held_truly() == CUBE and np.abs(cell.joints() - station_of(session, library).robot.home).max() < 1e-3
     return result
 
 
