@@ -42,11 +42,9 @@ def _inertia(arm: Arm, i: int) -> dict[str, Any]:
 
 
 def _add_link_pieces(spec: Any, node: Any, arm: Arm, link: int) -> None:
-    touching = Touching(ARM)
-    for body in arm.bodies:
-        if body.link == link:
-            for k, hull in enumerate(body.hulls):
-                add_piece(spec, node, f"{body.name}_{k}", hull, touching)
+    hulls = [hull for body in arm.bodies if body.link == link for hull in body.hulls]
+    for k, hull in enumerate(hulls):
+        add_piece(spec, node, f"link{link}_{k}", hull, Touching(ARM))
 
 
 def _add_hand(spec: Any, last: Any, arm: Arm) -> None:

@@ -157,6 +157,17 @@ def test_the_arm_tracks_what_it_is_told_to_a_tenth_of_a_millimetre(hands):
     assert (np.diff(twice.time_s) >= 0).all() and twice.time_s[-1] == pytest.approx(2 * moved.time_s)
 
 
+@pytest.mark.parametrize("name", ["puma560", "panda", "xarm7", "ur3", "ur10"])
+def test_every_arm_of_the_library_is_held_on_its_way(library, name):
+    robot = library.robot(name)
+    cell = simulated_cell(Workcell(robot=name), library)
+    aside = robot.home + 0.2 * np.where(np.arange(len(robot.home)) % 2, 1.0, -1.0)
+    moved = cell.follow(time_path(robot, PathResult("found", "", np.array([robot.home, aside])), robot.hand.opening_max))
+    assert moved.ended == "arrived" and tracking_error(moved.recording, arm_of(robot)).joint_rad < 5e-4
+    closed = cell.grip(robot.hand.opening_min)
+    assert closed.ended == "arrived" and closed.opening_m == pytest.approx(robot.hand.opening_min, abs=1e-4)
+
+
 def test_the_bare_hand_stops_on_the_table_within_a_millimetre(library, arms):
     hands = Hands(cell_with(library, bodies=()), arms)
     hands.go(raised(over(START), 0.03), opening=0.03)
