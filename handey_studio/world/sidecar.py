@@ -69,7 +69,8 @@ def sidecar_text(part: Part) -> str:
     for name, mate in part.mates.items():
         xyz, rpy = to_xyz_rpy(mate.T_this_part)
         lines += ["", f"[mates.{_text(name)}]", f"part = {_text(mate.part)}"]
-        lines += [f"xyz_m = {_numbers(xyz, 12)}", f"rpy_deg = {_numbers(np.rad2deg(rpy), 9)}"]
+        degrees = np.round(np.rad2deg(rpy), 9)
+        lines += [f"xyz_m = {_numbers(xyz, 12)}", f"rpy_deg = {_numbers(np.where(degrees == -180.0, 180.0, degrees), 9)}"]
     return "\n".join(lines) + "\n"
 
 

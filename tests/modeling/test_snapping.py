@@ -31,7 +31,8 @@ def top_patch() -> Patches:
     """What a segmentation would say of the carton's top, its far side hidden by something."""
     ring = np.array([[-0.04, -0.03, 0.05], [0.04, -0.03, 0.05], [0.04, 0.03, 0.05], [-0.04, 0.03, 0.05]])
     borders = (Border("crease", 1), Border("crease", 2), Border("cut"), Border("rim"))
-    patch = Patch(0, np.array([0.0, 0.0, 1.0]), 0.05, (ring,), (borders,), 1e-4, 0.0048, 1000, 0.001, 0)
+    numbers = {"rms": 1e-4, "area": 0.0048, "readings": 1000, "bend": 0.0, "tilt": 0.001}
+    patch = Patch(0, np.array([0.0, 0.0, 1.0]), 0.05, (ring,), (borders,), **numbers, object=0)
     points = apply(SCAN.view.T_world_sensor, SCAN.view.points_sensor())
     labels = np.where(points[..., 2] < 1e-4, SUPPORT, np.where(np.abs(points[..., 2] - 0.05) < 1e-4, 0, -1))
     return Patches(labels, (patch,), ((0,),))

@@ -87,7 +87,7 @@ def test_the_unit_is_asked_for_and_guessed(tmp_path):
 
 
 @pytest.mark.parametrize(("edge", "sigma", "tolerance"), [(0.01, 0.0, 0.0005), (0.004, 0.0002, 0.001), (0.003, 0.0003, 0.002)])
-@pytest.mark.parametrize("name", ["bracket", "l_block", "wedge"])
+@pytest.mark.parametrize("name", ["bracket", "wedge"])
 def test_a_rough_scan_is_simplified_to_what_it_was(name, edge, sigma, tolerance, tmp_path):
     truth = LIBRARY.part(name).solid
     mesh = rough(truth, edge, sigma)
@@ -119,7 +119,7 @@ def test_a_rough_scan_is_refused_with_what_would_help(tmp_path):
 
 
 def test_round_things_are_no_parts(tmp_path):
-    path = in_mm(trimesh.creation.icosphere(subdivisions=3, radius=0.15), tmp_path / "ball.stl")
+    path = in_mm(trimesh.creation.icosphere(subdivisions=2, radius=0.15), tmp_path / "ball.stl")
     with pytest.raises(BadInput, match="only shapes with flat faces can be parts"):
         import_part(path, MM)
     with pytest.raises(BadInput, match=r"planes|round|off somewhere|meet in a corner"):

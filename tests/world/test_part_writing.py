@@ -47,11 +47,11 @@ solids = st.one_of(
         lambda a, b, c, h: prism([[0, 0], [a + c, 0], [a + c, b], [a, b], [a, b + c], [0, b + c]], h), lengths, lengths, lengths, lengths
     ),
 )
-angles = st.floats(-180.0, 180.0)
+angles, pitches = st.floats(-180.0, 180.0), st.floats(-85.0, 85.0)  # at 90° roll and yaw are not told apart
 
 
-@given(solids, st.tuples(angles, angles, angles), st.floats(10, 9000), st.floats(0, 2), st.text(max_size=30))
-@settings(max_examples=40, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(solids, st.tuples(angles, pitches, angles), st.floats(10, 9000), st.floats(0, 2), st.text(max_size=30))
+@settings(max_examples=25, deadline=None, phases=(Phase.explicit, Phase.generate))
 def test_what_is_written_is_read_again(tmp_path_factory, solid, rpy, density, friction, source):
     T = from_xyz_rpy((0.1, -0.02, 0.3), np.deg2rad(rpy))
     turned = Polyhedron(solid.vertices @ T[:3, :3].T + T[:3, 3], solid.faces)
