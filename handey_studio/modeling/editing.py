@@ -18,8 +18,9 @@ from handey_studio.modeling.sweeping import swept_face
 
 PARALLEL_RAD = float(np.deg2rad(0.2))  # what the polyhedron itself takes for one plane
 LEAST_WAY_M = 1e-6
+CLEAR = 0.996  # a share of the way to where an edge ends that leaves no sliver
 HALVINGS = 24  # finds how far a move can go, as a share of what was asked
-SOUND_HALVINGS = 11  # the same where each try takes ten times as long
+SOUND_HALVINGS = 9  # the same where each try takes ten times as long
 
 
 def moved_face(solid: Polyhedron, f: int, distance: float) -> Change:
@@ -115,10 +116,12 @@ def _changed(
 
 
 def _limit(solid: Polyhedron, planes: Callable[[float], tuple[NDArray, NDArray]]) -> float:
-    """The share of a change that is possible: as far as no edge turns round, which is soon checked, else what stays sound."""
+    """The share of a change that is possible, to half a percent: as far as no edge turns round, which is soon checked, else what stays
+    sound."""
     share = _last_that(lambda share: _still(_corners, solid, *planes(share)), 1.0, HALVINGS)
-    if _still(_rebuilt, solid, *planes(share)):
-        return share
+    for near in (share, CLEAR * share):
+        if _still(_rebuilt, solid, *planes(near)):
+            return near
     return _last_that(lambda share: _still(_rebuilt, solid, *planes(share)), share, SOUND_HALVINGS)
 
 

@@ -60,7 +60,7 @@ def test_the_limit_of_a_move_is_where_an_edge_ends(pose):
     check_solid(ridge)
     assert len(ridge.faces) == 5
     assert_allclose(ridge.volume_and_centroid[0], 0.5 * 0.1 * 0.075 * 0.05, rtol=1e-9)
-    with pytest.raises(BadInput, match=r"the limit is 29\.9\d? mm: nothing would be left"):
+    with pytest.raises(BadInput, match=r"the limit is 29\.[89]\d? mm: nothing would be left"):
         moved_face(solid, top, -0.03)
 
 
