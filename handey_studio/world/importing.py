@@ -15,12 +15,11 @@ from handey_studio.geometry.polyhedron import MAX_TRIANGLES, check_closed, trian
 from handey_studio.world.model_files import MESH_SUFFIXES, Mesh, read_mesh
 from handey_studio.world.part import Part, Provenance
 from handey_studio.world.simplify import MAX_TRIANGLES as MOST_SIMPLIFIED
-from handey_studio.world.simplify import simplified
+from handey_studio.world.simplify import MOST_FACES, simplified
 from handey_studio.world.step_files import STEP_SUFFIXES, read_step
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}  # in metres
 USUAL_M = (0.008, 1.0)  # how large across parts that a hand takes are
-MOST_FACES = 200  # of a part that somebody designed; more come from a scan or from roundness
 TRIED_M = (0.0002, 0.0005, 0.001, 0.002)  # tolerances that are tried to say what would help
 
 
@@ -155,8 +154,7 @@ def _what_helps(corners: NDArray, triangles: NDArray) -> str:
             made = simplified(corners, triangles, tolerance)
         except BadInput:
             continue
-        if len(made.solid.faces) <= MOST_FACES:
-            return f"simplified within {1e3 * tolerance:g} mm it would have {len(made.solid.faces)} faces"
+        return f"simplified within {1e3 * tolerance:g} mm it would have {len(made.solid.faces)} faces"
     return f"it is round, or too rough to be simplified within {1e3 * TRIED_M[-1]:g} mm: only shapes with flat faces can be parts"
 
 

@@ -16,7 +16,7 @@ from handey_studio.world.numbering import pieces
 from handey_studio.world.plane_clusters import neighbours, plane_clusters, region_planes
 
 MAX_TRIANGLES = 200_000
-MOST_FACES = 500
+MOST_FACES = 200  # of a part that somebody designed; more come from a scan or from roundness
 PARALLEL = 0.02  # planes that meet with a smaller least singular value have no corner that means anything
 FAR = 6.0  # a corner farther from where its regions touch than so many tolerances (and edges of the mesh) is none
 FAR_EDGES = 3.0
