@@ -26,7 +26,11 @@ def run(given: argparse.Namespace) -> int:
 
     check_output(given.json)
     library, wanted = Library.choose(given.library), given.seeds or range(10)
-    if given.faults:
+    if given.kit:
+        from handey_studio.session.bench_kit import bench_kit
+
+        report = bench_kit(wanted, library, print, given.robot, given.attempts)
+    elif given.faults:
         kinds = FAULTS if given.faults == "all" else tuple(given.faults.split(","))
         unknown = sorted(set(kinds) - set(FAULTS))
         if unknown:

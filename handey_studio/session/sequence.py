@@ -8,6 +8,7 @@ from handey_studio.cell.simulated import SimulatedCell
 from handey_studio.session.run import ShowingProgress, cell_of, move_options, recovery_options, station_of
 from handey_studio.session.session import CommandState, Session
 from handey_studio.task import Outcome, Scene, Station, check_command, run_move
+from handey_studio.task.destination import base_name
 from handey_studio.world import Library
 
 OVER = ("done", "skipped")
@@ -70,8 +71,18 @@ def run_list(
 
 def _one(session: Session, number: int, station: Station, cell: Cell, scene: Scene | None, progress: Share) -> Outcome:
     """One command; the scene that was seen after the one before serves, if nothing moved since."""
-    options, recovery = move_options(session), recovery_options(session)
+    options, recovery = replace(move_options(session), settled=_settled(session, number)), recovery_options(session)
     return run_move(station, cell, session.commands[number], options, progress=progress, recovery=recovery, scene=scene)
+
+
+def _settled(session: Session, number: int) -> tuple[tuple[str, float, float, float], ...]:
+    """Where the commands that are done put their parts."""
+    found = []
+    for k, state in enumerate(states_of(session)):
+        T = session.results[state.result].T_world_part_reached if state.status == "done" and k != number else None
+        if T is not None:
+            found.append((base_name(session.commands[k].part), *T[:3, 3].tolist()))
+    return tuple(found)
 
 
 def _with_outcome(session: Session, number: int, outcome: Outcome, cell: SimulatedCell) -> Session:

@@ -18,14 +18,18 @@ from handey_studio.task.plan import MoveCommand, MovePlan, MoveResult
 from handey_studio.task.search import OptionSearch, SearchOptions, settle
 from handey_studio.world import Part, PlacedPart, World
 
+SETTLED_M = 0.02  # nearer than this to where it was put it is the same part, whatever the naming of its symmetries
+
 
 @dataclass(frozen=True)
 class MoveOptions:
     """`seed` drives every choice by chance; `search` bounds the work, which is counted, not timed. A part that could nearly as well stand
-    otherwise, or be another, is not moved: `most_doubt` is the greatest share of its own probability that the likeliest rival may have."""
+    otherwise, or be another, is not moved: `most_doubt` is the greatest share of its own probability that the likeliest rival may have.
+    `settled` are parts (name, x, y, z [m]) that earlier commands put in their places: a command that does not name one does not mean it."""
 
     seed: int = 0
     most_doubt: float = 0.8
+    settled: tuple[tuple[str, float, float, float], ...] = ()
     search: SearchOptions = field(default_factory=SearchOptions)
 
 
@@ -52,7 +56,7 @@ def plan_move(
     check_command(command, parts)
     ledger, timing = Ledger(), {}
     with _timed(timing, "destination"):
-        goals = _goals(world, command, parts, ledger, doubts or {}, options.most_doubt)
+        goals = _goals(world, command, parts, ledger, doubts or {}, options)
     plan, reason = None, "" if goals else _goal_reason(world, command, ledger)
     if goals:
         search = OptionSearch(start, ledger, progress, np.random.default_rng(options.seed), options.search)
@@ -93,15 +97,18 @@ def _close(search: OptionSearch, plan: MovePlan | None, ledger: Ledger) -> None:
 
 
 def _goals(
-    world: World, command: MoveCommand, parts: dict[str, Part], ledger: Ledger, doubts: Mapping[str, float], most_doubt: float
+    world: World, command: MoveCommand, parts: dict[str, Part], ledger: Ledger, doubts: Mapping[str, float], options: MoveOptions
 ) -> list[Goal]:
     """The instances that the command may mean, each with every place that its destination may mean."""
     destination = parse_destination(command.to, command.part, parts)
     found = []
     for placed in _candidates(world, command.part):
-        if doubts.get(placed.name, 0.0) > most_doubt:
-            ledger.add("destination", placed.name, "it could nearly as well stand otherwise, or be another part", limit=most_doubt,
+        if doubts.get(placed.name, 0.0) > options.most_doubt:
+            ledger.add("destination", placed.name, "it could nearly as well stand otherwise, or be another part", limit=options.most_doubt,
                        value=doubts[placed.name])  # fmt: skip
+            continue
+        if placed.name != command.part and _is_settled(placed, options):
+            ledger.add("destination", placed.name, "an earlier command put it there")
             continue
         area = isinstance(destination, Area)
         poses = area_poses(world, placed, destination, ledger) if area else goal_poses(destination, placed.name, parts, world.parts)
@@ -110,6 +117,12 @@ def _goals(
             if goal is not None:
                 found.append(goal)
     return found
+
+
+def _is_settled(placed: PlacedPart, options: MoveOptions) -> bool:
+    """Whether an earlier command put it where it stands."""
+    places = [place for name, *place in options.settled if name == placed.part.name]
+    return any(np.linalg.norm(placed.T_world_part[:3, 3] - place) < SETTLED_M for place in places)
 
 
 def _candidates(world: World, name: str) -> list[PlacedPart]:
