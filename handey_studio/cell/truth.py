@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base.errors import unknown_name
 from handey_studio.cell.bodies import SolidBody, check_names, fixed_bodies, solid_body
-from handey_studio.cell.faults import Fault
+from handey_studio.cell.faults import Fault, check_faults
 from handey_studio.cell.in_view import arm_bodies
 from handey_studio.cell.physics import settle
 from handey_studio.cell.stripes import photograph
@@ -32,6 +32,10 @@ class TrueState(ABC):
         self._robot = library.robot(workcell.robot)
         self._arm = arm_of(self._robot)
         self._scans = 0
+        names = [body.name for body in workcell.setup.bodies]
+        check_faults(workcell.setup.faults, names, self._arm.n)
+        if workcell.setup.held is not None and workcell.setup.held not in names:
+            raise unknown_name("body", workcell.setup.held, names)
 
     @abstractmethod
     def joints(self) -> NDArray: ...

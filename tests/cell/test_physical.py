@@ -1,11 +1,14 @@
 """The cell with forces: friction grips, weights are felt, guarded motions stop, faults do what they say, and all of it twice the same."""
 
+import json
 import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from handey_studio.base import BadInput
+from handey_studio.base.coding import from_plain, to_plain
 from handey_studio.cell import CannotAct, Cell, Fault, joined, tracking_error
 from handey_studio.cell.examples import figure1
 from handey_studio.cell.physical import PhysicalCell
@@ -265,6 +268,28 @@ def test_a_jammed_joint_blocks_the_arm(library, robot):
     moved = cell.follow(gentle([robot.home, aside], 1.0, 0.09))
     assert moved.ended == "blocked" and 0.3 < moved.time_s < 1.0
     assert abs(cell.joints()[1] - robot.home[1]) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (Fault("push", "scan", body="nobody"), "nobody"),
+        (Fault("obstacle", "scan"), "sides above 0"),
+        (Fault("blocked", "follow", size=6.0), "joints 0 to 5"),
+        (Fault("slip", "follow", time_s=np.nan), "finite"),
+        (Fault("slip", "follow", count=0), "count"),
+    ],
+)
+def test_faults_that_cannot_be_are_refused_in_a_sentence(library, fault, words):
+    with pytest.raises(BadInput, match=words):
+        cell_with(library, fault)
+
+
+def test_a_setup_comes_back_from_a_file_as_it_was(library):
+    setup = SimulatedSetup((TrueBody("block", START, size=BLOCK),), faults=(Fault("push", "grip", vector=np.ones(3)),), held="block")
+    assert from_plain(json.loads(json.dumps(to_plain(setup))), SimulatedSetup) == setup
+    with pytest.raises(BadInput, match="not known"):
+        cell_with(library, held="nobody")
 
 
 def test_it_refuses_what_an_arm_would_refuse(hands):
