@@ -123,6 +123,18 @@ def test_a_grip_holds_just_as_long_as_friction_can(library, arms):
         assert (hands.cell.true_pose("block")[2, 3] > START[2, 3] + 0.9 * HOVER) == holds
 
 
+def test_the_wrist_feels_the_lever_of_what_is_held_off_its_middle(hands):
+    aside = transform(None, (0.015, 0.0, 0.0)) @ over(START)
+    hands.go(raised(aside, HOVER))
+    hands.straight(aside, 0.8)
+    hands.grip(BLOCK[1] - 0.002)
+    hands.straight(raised(aside, HOVER), 0.8)
+    wrench = hands.cell.wrench()
+    lever = hands.cell.true_pose("block")[:3, 3] - arm_of(hands.arms.robot).hand_pose(hands.cell.joints())[:3, 3]
+    assert lever[0] == pytest.approx(-0.015, abs=3e-4)
+    assert wrench.torque_Nm == pytest.approx(np.cross(lever, (0.0, 0.0, -WEIGHT_N)), abs=1e-3)
+
+
 def test_what_is_put_down_by_force_stands_where_it_was(hands):
     hands.take()
     hands.lift()
