@@ -30,7 +30,7 @@ TURNED = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 def cell_with(library, *faults, bodies=(TrueBody("block", START, size=BLOCK),), blocks=(), **setup) -> PhysicalCell:
     setup = SimulatedSetup(bodies, physics=True, faults=faults, **setup)
-    cell = simulated_cell(Workcell(blocks=blocks, finder=RangeFinder(planes=200, cell=0.004), setup=setup), library)
+    cell = simulated_cell(Workcell(blocks=blocks, finder=RangeFinder(planes=200, cell=0.004, area=(0.1, 0.1)), setup=setup), library)
     assert isinstance(cell, PhysicalCell)
     return cell
 
