@@ -60,7 +60,7 @@ class NewSession:
     name: str = "untitled"
 
     def run(self, bench: Bench) -> State:
-        state, kept = _put_away(bench.state)
+        state, kept = put_away(bench.state)
         session = replace(state.session.without_findings(), name=check_name(self.name))
         return _shown(bench, opened(state.library, session, None, state), f"New session in the same workcell.{kept}")
 
@@ -76,7 +76,7 @@ class OpenSession:
             find_session(bench.state.library, self.name)
         path = bench.state.library.sessions()[self.name]
         session = read_session(path)
-        state, kept = _put_away(bench.state)
+        state, kept = put_away(bench.state)
         return _shown(bench, opened(state.library, session, path, state), f'Opened "{session.name}".{kept}')
 
 
@@ -91,7 +91,7 @@ class UploadSession:
         if len(self.content) > MAX_UPLOAD_BYTES:
             raise BadInput(f'"{self.file_name}" has {len(self.content)} bytes, the limit for a session is {MAX_UPLOAD_BYTES}.')
         session = session_from_bytes(self.content, self.file_name)
-        state, kept = _put_away(bench.state)
+        state, kept = put_away(bench.state)
         return _shown(bench, opened(state.library, session, None, state), f'Opened "{session.name}" from the upload.{kept}')
 
 
@@ -240,11 +240,16 @@ def _writable(path: Path, state: State) -> bool:
     return not path.is_relative_to(bundled()) or path.is_relative_to(state.library.folder)
 
 
-def _put_away(state: State) -> tuple[State, str]:
+def worth_keeping(state: State) -> bool:
+    """Whether what is not saved is more than a session that was only opened."""
+    return state.unsaved and (state.saved is not None or state.taken_up or bool(state.session.results) or bool(state.undo))
+
+
+def put_away(state: State) -> tuple[State, str]:
     """Before another session comes: what was not saved goes to the library, and the planner may not be at work."""
     if state.job is not None:
         raise BadInput("the planner is at work; cancel first or wait for it.")
-    if not state.unsaved or (state.saved is None and not state.session.results and not state.undo):
+    if not worth_keeping(state):
         return state, ""
     path = own_file(state.library, f"{state.session.name} (unsaved)"[:120])
     write_session(path, replace(state.session, name=path.stem))

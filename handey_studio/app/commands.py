@@ -19,7 +19,8 @@ from handey_studio.app.browsing import (
     wired,
 )
 from handey_studio.app.modelling.clicks import click_taken_back
-from handey_studio.app.state import State, redone, undone, with_robot, with_view
+from handey_studio.app.settings import with_robot
+from handey_studio.app.state import State, redone, undone, with_view
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.session.checks import MAX_ATTEMPTS, MAX_IMPROVE

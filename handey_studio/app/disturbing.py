@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handey_studio.app.state import State, with_disturbances
+from handey_studio.app.settings import with_disturbances
+from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.cell.faults import Fault
 from handey_studio.geometry.transforms import from_xyz_rpy

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from handey_studio.app.state import Job, State, with_view
 from handey_studio.session import CommandState, Session
@@ -42,10 +43,10 @@ class JobShows:
 
 @dataclass(frozen=True, eq=False)
 class JobDone:
-    """The planner is through; the result plays from its start."""
+    """The planner is through; the result of a MOVE plays from its start."""
 
     number: int
-    session: Session
+    session: Any
 
     def apply(self, state: State) -> State:
         if state.job is None or state.job.number != self.number:
@@ -81,7 +82,7 @@ class JobStarted:
 
     execute: bool
     title: str = ""
-    done: Callable[[State, Session], State] | None = None
+    done: Callable[[State, Any], State] | None = None
 
     def apply(self, state: State) -> State:
         job = Job(state.jobs + 1, self.execute, title=self.title, done=self.done)

@@ -18,8 +18,9 @@ from handey_studio.world import Library
 
 log = logging.getLogger(__name__)
 
-Run = Callable[..., Session]
-"""run(session, library, execute, progress) -> Session, with `progress.show(session)` to show what was found so far."""
+Run = Callable[..., Any]
+"""run(session, library, execute, progress) -> Session, with `progress.show(session)` to show what was found so far. A job that says itself
+what becomes of what comes back may return something else."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Shown:
 @dataclass(frozen=True, eq=False)
 class Finished:
     number: int
-    session: Session
+    found: Any
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import viser
 
+from handey_studio.app.autosave import Offer, left_behind
 from handey_studio.app.planner import Run
 from handey_studio.app.wire import close_share_tunnel
 from handey_studio.app.workbench import Workbench
@@ -49,6 +50,9 @@ def start(
     close_share_tunnel(server)
     prepare = partial(warm_up, robot) if run is run_session else None
     workbench = Workbench(server, library, session, path, run, prepare)
+    left = left_behind(library)
+    if left is not None:
+        workbench.send(Offer(left))
     workbench.start()
     return workbench
 

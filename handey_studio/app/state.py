@@ -4,68 +4,24 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from handey_studio.app.grasp_look import GraspLook
 from handey_studio.app.modelling.look import ModelLook
+from handey_studio.app.settings import Settings
 from handey_studio.base import Entry
-from handey_studio.cell.faults import Fault
 from handey_studio.localization import Hypothesis
 from handey_studio.localization.explain import Explanation
-from handey_studio.modeling.draft import Draft
 from handey_studio.session import Moment, Replay, Session, Told, attempts_of, replay_of
-from handey_studio.session.command_list import with_commands
 from handey_studio.session.handling import Handling
 from handey_studio.session.ledger_tree import ROOT
+from handey_studio.task.calibrate import RangeCalibration
 from handey_studio.task.performance import Performance
 from handey_studio.task.plan import Carry, MoveCommand, MovePlan
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Robot
 
 MAX_UNDO = 100
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What the user sets and can take back: the MOVE commands, how they are planned and tried, the robot, whether the simulated cell obeys
-    forces and what goes wrong in it on purpose, where the range finder is taken to stand, and the part that is being modelled."""
-
-    commands: tuple[MoveCommand, ...]
-    seed: int
-    robot: str
-    draft: Draft | None = None
-    attempts: int = 3
-    improve: int = 0
-    physics: bool = False
-    faults: tuple[Fault, ...] = ()
-
-    @classmethod
-    def of(cls, session: Session) -> "Settings":
-        workcell = session.workcell
-        how = session.attempts, session.improve, workcell.setup.physics, workcell.setup.faults
-        return cls(session.commands, session.seed, workcell.robot, session.draft, *how)
-
-    def put_into(self, session: Session) -> Session:
-        session = replace(with_commands(session, self.commands), seed=self.seed, draft=self.draft)
-        session = replace(session, attempts=self.attempts, improve=self.improve)
-        return with_robot(with_disturbances(session, self.physics, self.faults), self.robot)
-
-
-def with_robot(session: Session, robot: str) -> Session:
-    """The session with another robot in its workcell: what was planned for the one before goes, what was scanned stays."""
-    if robot == session.workcell.robot:
-        return session
-    view = replace(session.view, time_s=0.0, result=-1)
-    return replace(session, workcell=replace(session.workcell, robot=robot), results=(), view=view)
-
-
-def with_disturbances(session: Session, physics: bool, faults: tuple[Fault, ...]) -> Session:
-    """The session whose simulated cell obeys forces or not, and in which this goes wrong on purpose; its bodies stay where they are."""
-    before = session.workcell.setup
-    if (before.physics, before.faults) == (physics, faults):
-        return session
-    now = None if session.cell_now is None else replace(session.cell_now, physics=physics, faults=faults)
-    workcell = replace(session.workcell, setup=replace(before, physics=physics, faults=faults))
-    return replace(session, workcell=workcell, cell_now=now)
 
 
 @dataclass(frozen=True)
@@ -79,7 +35,7 @@ class Change:
 @dataclass(frozen=True)
 class Job:
     """What the planner is doing. `execute`: whether the cell carries the plan out. A job that is no MOVE has a `title` and says with
-    `done` what becomes of the session that comes back."""
+    `done` what becomes of what comes back."""
 
     number: int
     execute: bool
@@ -87,7 +43,7 @@ class Job:
     message: str = "Starting the planner; the first time on a machine it compiles for half a minute."
     cancelling: bool = False
     title: str = ""
-    done: "Callable[[State, Session], State] | None" = None
+    done: "Callable[[State, Any], State] | None" = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +79,9 @@ class State:
 
     `ledger_at` is the entry whose branches are listed, page by page, `ledger_entry` the one that is looked at; `ROOT` is none.
     `hypothesis_part`, `hypothesis_verdict` and `edge_min_m` narrow down what of the localizer's work is looked at.
-    `chosen` is the place in the list of the command that is set up, -1 for the last.
+    `chosen` is the place in the list of the command that is set up, -1 for the last. `calibration` is
+    one that was neither accepted nor discarded yet. `left_behind` is a working copy of an earlier run that waits for a word of the user's,
+    `taken_up` whether this session is one.
     """
 
     library: Library
@@ -154,6 +112,9 @@ class State:
     grasp_look: GraspLook = field(default_factory=GraspLook)
     model: ModelLook = field(default_factory=ModelLook)
     chosen: int = -1
+    calibration: RangeCalibration | None = None
+    left_behind: Path | None = None
+    taken_up: bool = False
     loads: int = field(default=0)
 
     @property
@@ -227,7 +188,7 @@ class State:
     @property
     def unsaved(self) -> bool:
         """Whether something worth keeping differs from the file. How one looks at it is not worth a question."""
-        return self.saved is None or _kept(self.saved) != _kept(self.session)
+        return self.saved is None or kept(self.saved) != kept(self.session)
 
     @property
     def command(self) -> MoveCommand | None:
@@ -265,7 +226,8 @@ def opened(library: Library, session: Session, path: Path | None, before: State 
     state = State(library, session, robot, saved=session if path else None, path=path)
     if before is None:
         return state
-    return replace(state, jobs=before.jobs, notices=before.notices, viewers=before.viewers, speed=before.speed, loads=before.loads + 1)
+    here = {"viewers": before.viewers, "speed": before.speed, "left_behind": before.left_behind}
+    return replace(state, jobs=before.jobs, notices=before.notices, loads=before.loads + 1, **here)
 
 
 def undone(state: State) -> State:
@@ -303,7 +265,7 @@ def _replay(robot: Robot, plan: MovePlan, performance: Performance | None) -> Re
     return replay_of(robot, Told(plan, performance))
 
 
-def _kept(session: Session) -> tuple:
+def kept(session: Session) -> tuple:
     """What makes a session worth saving. Arrays are compared by identity: they never change."""
     found = id(session.scene), tuple(map(id, session.results))
     how = session.seed, session.attempts, session.improve

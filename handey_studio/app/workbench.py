@@ -12,6 +12,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from handey_studio.app.autosave import Autosave
 from handey_studio.app.commands import CameraMoved, Tell, Viewers
 from handey_studio.app.explaining import Explainer
 from handey_studio.app.handling import Handler
@@ -57,6 +58,7 @@ class Workbench:
         self._running = threading.Event()
         self._running.set()
         self.planner = Planner(run, lambda message: self.send(heard(message)), prepare)
+        self._autosave = Autosave(library)
         self._background = (Explainer(self.send), Handler(self.send), *modelling_workers(self.send))
         self._view = View(server, self.send)
         self._start_from(session.view.camera_position, session.view.camera_look_at)
@@ -77,6 +79,7 @@ class Workbench:
         self._thread.join(timeout=10)
         for worker in self._background:
             worker.stop()
+        self._autosave.stop()
         self.planner.stop()
         self.server.stop()
 
@@ -155,7 +158,8 @@ class Workbench:
             self.look(self._before.camera_position, self._before.camera_look_at, None)
 
     def _follow(self) -> None:
-        """What the state wants worked out is worked out in the background."""
+        """What the state wants worked out is worked out in the background; what is not saved is kept."""
+        self._autosave.follow(self.state)
         for worker in self._background:
             worker.follow(self.state)
 
@@ -193,8 +197,8 @@ def heard(message: Any) -> Any:
             return JobProgress(number, fraction, text)
         case Shown(number, session):
             return JobShows(number, session)
-        case Finished(number, session):
-            return JobDone(number, session)
+        case Finished(number, found):
+            return JobDone(number, found)
         case Failed(number, sentence):
             return JobFailed(number, sentence)
     return Tell(f"The planner said something unknown: {type(message).__name__}.", "bad")

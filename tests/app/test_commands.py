@@ -30,7 +30,8 @@ from handey_studio.app.commands import (
 from handey_studio.app.guidance import next_step
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows, JobStarted
 from handey_studio.app.playback import Seek, SeekStep, SetPlayback, Tick, TogglePlay
-from handey_studio.app.state import MAX_UNDO, Settings, opened
+from handey_studio.app.settings import Settings
+from handey_studio.app.state import MAX_UNDO, opened
 from handey_studio.base import BadInput, Ledger
 from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy
 from handey_studio.session.destination import destination_pose, snapped

@@ -41,8 +41,8 @@ def test_a_job_reports_is_cancelled_and_the_next_one_is_not(planner_of, tmp_path
         assert wait_for(heard, Progressed).number == number
         planner.cancel()
         done = wait_for(heard, Finished)
-        assert done.number == number and done.session.results[0].reason == "cancelled"
-        assert done.session.parts == session.parts
+        assert done.number == number and done.found.results[0].reason == "cancelled"
+        assert done.found.parts == session.parts
 
 
 def test_a_process_that_ends_is_told_and_replaced(planner_of, tmp_path):
@@ -52,7 +52,7 @@ def test_a_process_that_ends_is_told_and_replaced(planner_of, tmp_path):
     failed = wait_for(heard, Failed)
     assert failed.broken and "exit status 7" in failed.sentence
     planner.order(2, fresh_session(tmp_path), library(tmp_path), True)
-    assert wait_for(heard, Finished).session.results[0].reason == "survived"
+    assert wait_for(heard, Finished).found.results[0].reason == "survived"
     assert planner.pid != before
 
 

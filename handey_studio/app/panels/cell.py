@@ -2,6 +2,7 @@
 
 import viser
 
+from handey_studio.app.panels.calibration import CalibrationPanel
 from handey_studio.app.panels.disturbing import DisturbingPanel
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send
@@ -13,6 +14,9 @@ class CellPanel:
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         with gui.add_folder("Disturb the cell"):
             self._disturbing = DisturbingPanel(gui, send)
+        with gui.add_folder("Calibrate the range finder"):
+            self._calibration = CalibrationPanel(gui, send)
 
     def render(self, old: State | None, new: State) -> None:
         self._disturbing.render(old, new)
+        self._calibration.render(old, new)

@@ -6,9 +6,12 @@ import viser
 
 from handey_studio.app import html
 from handey_studio.app.actions import DownloadSession, NewSession, OpenSession, SaveSession, SaveSessionAs, UploadSession
+from handey_studio.app.autosave import LetGo, TakeUp
 from handey_studio.app.state import State
-from handey_studio.app.wire import Send, on_click, on_upload
+from handey_studio.app.wire import Send, on_click, on_upload, set_to
 
+TAKE_UP, LET_GO = "Take it up", "Discard it"
+LEFT = ("Something was not saved", "The workbench ended before a session was saved; a working copy of it is there.")
 BUTTONS = (("Session", ("New", "Open", "Save")), ("Copy", ("Save as", "Download")))
 
 
@@ -19,6 +22,9 @@ class SessionPanel:
         gui = server.gui
         self._server, self._send = server, send
         self._state: State | None = None
+        self._left = gui.add_html("", visible=False)
+        self._leaving = gui.add_button_group("Left behind", (TAKE_UP, LET_GO), visible=False)
+        on_click(self._leaving, send, lambda event: TakeUp() if event.target.value == TAKE_UP else LetGo())
         self._about = gui.add_html("")
         for label, choices in BUTTONS:
             on_click(gui.add_button_group(label, choices), send, self._pressed)
@@ -77,6 +83,9 @@ class SessionPanel:
 
     def render(self, old: State | None, new: State) -> None:
         self._state = new
+        offered = new.left_behind is not None
+        set_to(self._left, visible=offered, content=html.card(*LEFT, "info", "left-behind") if offered else "")
+        set_to(self._leaving, visible=offered)
         if old is not None and _looks(old) == _looks(new):
             return
         mark = " *" if new.unsaved else ""

@@ -1,0 +1,93 @@
+"""Calibrating the range finder to the robot (Handey 1987 §6) from the workbench: start, accept, discard; the hidden misplacement."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from handey_studio.app.actions import Bench
+from handey_studio.app.disturbing import check_idle
+from handey_studio.app.jobs import JobStarted
+from handey_studio.app.settings import with_finder_at
+from handey_studio.app.state import State
+from handey_studio.base import BadInput
+from handey_studio.geometry.transforms import from_xyz_rpy
+from handey_studio.session import Session
+from handey_studio.session.calibrating import calibrated, cell_with_cube, misplaced
+from handey_studio.session.run import station_of
+from handey_studio.task.calibrate import CalibrateOptions, RangeCalibration, calibrate_range
+from handey_studio.world import Library
+
+MOST_OFF_M, MOST_TURN_RAD = 0.009, np.deg2rad(1.5)  # of a misplacement that is drawn by chance
+
+
+@dataclass(frozen=True)
+class StartCalibration:
+    """The hand shows a cube at so many poses, each is scanned."""
+
+    poses: int
+
+    def run(self, bench: Bench) -> State:
+        check_idle(bench.state)
+        options = CalibrateOptions(self.poses, seed=bench.state.session.seed)
+        state = JobStarted(True, "Calibrating", calibration_done).apply(replace(bench.state, calibration=None))
+        bench.planner.order(state.jobs, state.session, state.library, True, partial(calibrate, options))
+        return state
+
+
+def calibrate(options: CalibrateOptions, session: Session, library: Library, execute: bool, progress: Any) -> RangeCalibration:
+    """In the planner's process: put the cube into the hand and calibrate."""
+    cell = cell_with_cube(session, library, options.side_m)
+    return calibrate_range(station_of(session, library), cell, options, progress)
+
+
+def calibration_done(state: State, found: RangeCalibration) -> State:
+    """The state when a calibration has ended: what was found waits to be accepted."""
+    if found.fit is None:
+        return replace(state, calibration=found).told(f"The calibration failed: {found.reason}", "bad")
+    return replace(state, calibration=found).told(
+        "The range finder's frame was found. Accept it, or discard it, in the Cell tab.", "planned"
+    )
+
+
+@dataclass(frozen=True)
+class AcceptCalibration:
+    """From now on the range finder is believed to stand where the calibration found it."""
+
+    def apply(self, state: State) -> State:
+        check_idle(state)
+        if state.calibration is None or state.calibration.fit is None:
+            raise BadInput("there is no calibration to accept; press Calibrate first.")
+        session = calibrated(state.session, state.calibration.fit.T_world_range)
+        return replace(state.changed("calibrate the range finder", session), calibration=None, playing=False)
+
+
+@dataclass(frozen=True)
+class DiscardCalibration:
+    def apply(self, state: State) -> State:
+        return replace(state, calibration=None)
+
+
+@dataclass(frozen=True)
+class Misplace:
+    """The simulated range finder is moved by some millimetres and turned, and nobody is told how far; or it stands where it should."""
+
+    misplaced: bool
+
+    def apply(self, state: State) -> State:
+        check_idle(state)
+        if not self.misplaced:
+            session = with_finder_at(state.session, state.session.workcell.finder.T_world_range, np.eye(4))
+            return replace(state.changed("put the range finder back", session), playing=False)
+        rng = np.random.default_rng()  # hidden from the user too: no seed tells it
+        xyz = rng.uniform(0.3, 1.0, 3) * rng.choice([-1.0, 1.0], 3) * MOST_OFF_M
+        yaw = rng.uniform(0.3, 1.0) * rng.choice([-1.0, 1.0]) * MOST_TURN_RAD
+        session = misplaced(state.session, from_xyz_rpy(xyz, (0.0, 0.0, float(yaw))))
+        return replace(state.changed("misplace the range finder", session), playing=False)
+
+
+def is_misplaced(state: State) -> bool:
+    """Whether the simulated range finder was moved on purpose, and not yet calibrated since."""
+    T = state.session.workcell.setup.T_range_offset
+    return not np.allclose(T, np.eye(4), atol=1e-9)

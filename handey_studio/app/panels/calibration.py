@@ -1,0 +1,91 @@
+"""Calibrate the range finder: start, the residual of each pose as a picture, the frame beside the paper's answer, Accept or Discard."""
+
+from typing import Any
+
+import numpy as np
+import viser
+
+from handey_studio.app import html, palette
+from handey_studio.app.actions import CancelMove
+from handey_studio.app.calibrating import AcceptCalibration, DiscardCalibration, Misplace, StartCalibration, is_misplaced
+from handey_studio.app.palette import css
+from handey_studio.app.state import State
+from handey_studio.app.wire import Send, on_click, on_user, set_to
+from handey_studio.sensing.frame_fit import FitOptions, FrameFit
+from handey_studio.task.calibrate import RangeCalibration
+from handey_studio.task.calibration_report import calibration_lines
+
+HOW = "The hand holds a cube and shows it here and there; its upper face is found in each scan. The first three poses are the paper's (§6)."
+WIDTH, ROW, LEFT = 270.0, 15.0, 26.0
+
+
+class CalibrationPanel:
+    """Top to bottom: how, start, progress, what was found, what becomes of it."""
+
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
+        gui.add_html(f'<div style="margin:0 14px 4px;font-size:12px;line-height:1.4;color:#6b7684">{HOW}</div>')
+        self._misplaced = gui.add_checkbox(
+            "Misplaced", False, hint="The simulated range finder is moved by some mm and turned; by how much stays hidden"
+        )
+        self._poses: Any = gui.add_number("Poses", 10, min=3, max=100, step=1)
+        self._start = gui.add_button("Calibrate", icon=viser.Icon.CUBE, color=palette.ARM_DARK)
+        self._progress = gui.add_html("", visible=False)
+        self._cancel = gui.add_button("Cancel the calibration", icon=viser.Icon.PLAYER_STOP, color=palette.VERMILLION, visible=False)
+        self._found = gui.add_html("")
+        self._accept = gui.add_button("Accept", icon=viser.Icon.CHECK, color=palette.BLUE, visible=False)
+        self._discard = gui.add_button("Discard", color="gray", visible=False)
+        on_user(self._misplaced, send, lambda event: Misplace(bool(event.target.value)))
+        on_click(self._start, send, lambda _: StartCalibration(int(self._poses.value)))
+        on_click(self._cancel, send, lambda _: CancelMove())
+        on_click(self._accept, send, lambda _: AcceptCalibration())
+        on_click(self._discard, send, lambda _: DiscardCalibration())
+
+    def render(self, old: State | None, new: State) -> None:
+        job, found = new.job, new.calibration
+        running = job is not None and job.title == "Calibrating"
+        set_to(self._misplaced, value=is_misplaced(new), disabled=job is not None)
+        set_to(self._start, disabled=job is not None)
+        set_to(self._cancel, visible=running, disabled=bool(job and job.cancelling))
+        set_to(self._progress, visible=running, content=html.card(f"{100 * job.fraction:.0f} %", job.message) if job and running else "")
+        if old is None or old.calibration is not found:
+            self._found.content = found_html(found) if found is not None else ""
+        set_to(self._accept, visible=found is not None and found.fit is not None, disabled=job is not None)
+        set_to(self._discard, visible=found is not None)
+
+
+def found_html(found: RangeCalibration) -> str:
+    """The residuals, the frame in words, warnings first."""
+    fit = found.fit
+    if fit is None:
+        return html.card("Not calibrated", found.reason, "bad", "calibration")
+    warnings = list(dict.fromkeys((*fit.warnings, *(found.free.warnings if found.free else ()))))
+    cards = "".join(html.card("Mind", warning, "bad", "calibration-warning") for warning in warnings)
+    lines = [line.strip() for line in calibration_lines(found) if not line.startswith(("pose", "  note"))]
+    rows = "".join(f"<li>{html.esc(line)}</li>" for line in lines)
+    words = f'<ul data-testid="calibration" style="margin:4px 14px 6px;padding-left:16px;font-size:12px;line-height:1.45">{rows}</ul>'
+    return cards + residuals_svg(fit) + words
+
+
+def residuals_svg(fit: FrameFit) -> str:
+    """A bar a pose, as long as its residual [mm]; poses that had no say are hollow; the line is where a pose counts as an outlier."""
+    sizes, limit = 1e3 * np.linalg.norm(fit.residuals_m, axis=1), 1e3 * FitOptions().outlier_m
+    most = max(float(sizes.max()), 1.15 * limit)
+    across = (WIDTH - LEFT - 44.0) / most
+    bars = "".join(_bar(k, float(size), bool(used), across) for k, (size, used) in enumerate(zip(sizes, fit.used, strict=True)))
+    height, at = ROW * len(sizes) + 14.0, LEFT + across * limit
+    line = f'<line x1="{at:.1f}" x2="{at:.1f}" y1="0" y2="{height - 13:.0f}" stroke="{css(palette.VERMILLION)}" stroke-dasharray="3 2"/>'
+    told = f'<text x="{at:.1f}" y="{height - 3:.0f}" font-size="9" text-anchor="middle" fill="#55606e">outlier from {limit:g} mm</text>'
+    title = '<div style="font-size:12px;margin-bottom:2px">Residual of each pose (mm)</div>'
+    svg = f'<svg viewBox="0 0 {WIDTH:g} {height:g}" width="100%" style="background:#f7f9fb;border-radius:4px">{bars}{line}{told}</svg>'
+    return f'<div data-testid="residuals" style="margin:6px 14px">{title}{svg}</div>'
+
+
+def _bar(number: int, size: float, used: bool, across: float) -> str:
+    y, colour = ROW * number, css(palette.TEAL if used else palette.VERMILLION)
+    look = f'fill="{colour}"' if used else f'fill="none" stroke="{colour}"'
+    end = LEFT + across * size
+    return (
+        f'<text x="{LEFT - 6:g}" y="{y + 11:g}" font-size="10" text-anchor="end" fill="#55606e">{number + 1}</text>'
+        f'<rect x="{LEFT:g}" y="{y + 3:g}" width="{max(end - LEFT, 1.0):.1f}" height="{ROW - 5:g}" {look}/>'
+        f'<text x="{end + 4:.1f}" y="{y + 11:g}" font-size="10" fill="#202935">{size:.2f}{"" if used else " left out"}</text>'
+    )
