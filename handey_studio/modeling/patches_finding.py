@@ -122,7 +122,8 @@ def _world_planes(view: DepthView, planes: NDArray, camera: Camera) -> NDArray:
 def _told(view: DepthView, labels: NDArray, planes: NDArray, sigma: NDArray, points: NDArray, creases: tuple[Crease, ...]) -> Patches:
     """The patches with their outlines; regions without a simple outline stay readings that belong to no patch."""
     seen = Seen(view, labels, planes, sigma, lost_at_rims(view))
-    outlines = [outlines_of(seen, k) for k in range(len(planes))]
+    parts = find_objects(labels + 1)
+    outlines = [outlines_of(seen, k, parts[k]) for k in range(len(planes))]
     kept = [k for k, found in enumerate(outlines) if found]
     number = np.full(len(planes) + 2, -1)  # the last two for "none" and "support", -1 and -2
     number[kept] = np.arange(len(kept))
@@ -133,7 +134,7 @@ def _told(view: DepthView, labels: NDArray, planes: NDArray, sigma: NDArray, poi
     for new, k in enumerate(kept):
         rings = tuple(outline.ring for outline in outlines[k])
         borders = tuple(tuple(Border(b.kind, int(number[b.other]), b.sigma) for b in outline.borders) for outline in outlines[k])
-        on = points[labels == new]
+        on = points[parts[k]][labels[parts[k]] == new]
         rms, bend, tilt = _flatness(on, planes[k])
         area = area_of(list(rings), planes[k, :3])
         patches.append(Patch(new, planes[k, :3], float(planes[k, 3]), rings, borders, rms, area, len(on), bend, tilt, 0))

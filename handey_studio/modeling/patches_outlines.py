@@ -30,12 +30,13 @@ class Outline(NamedTuple):
     borders: tuple[Border, ...]
 
 
-def outlines_of(seen: Seen, number: int) -> list[Outline]:
-    """The outer outline of a patch, counter-clockwise seen from outside, and those of its holes, clockwise; empty when it has none."""
-    rows, columns = np.nonzero(seen.labels == number)
-    top, left = rows.min() - 1, columns.min() - 1
-    mask = np.zeros((rows.max() - top + 2, columns.max() - left + 2), np.uint8)
-    mask[rows - top, columns - left] = 1
+def outlines_of(seen: Seen, number: int, part: tuple[slice, slice]) -> list[Outline]:
+    """The outer outline of a patch, counter-clockwise seen from outside, and those of its holes, clockwise; empty when it has none.
+
+    `part` is the rectangle of the image that the patch lies in.
+    """
+    top, left = part[0].start - 1, part[1].start - 1
+    mask = np.pad((seen.labels[part] == number).astype(np.uint8), 1)
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     mask[[0, -1]] = 0
     mask[:, [0, -1]] = 0

@@ -6,10 +6,13 @@ import pytest
 from handey_studio.geometry import prism
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.modeling.patches_finding import patches_of
+from handey_studio.modeling.patches_growing import _grow
+from handey_studio.modeling.patches_windows import _window_planes
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.suggest import suggest, suggest_all
 from handey_studio.modeling.suggest_fit import first_hits
 from handey_studio.modeling.suggest_report import aligned_box
+from handey_studio.modeling.suggest_warm_up import warm_up
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world import Library
 from tests.localization.rendering import resting_poses
@@ -100,3 +103,8 @@ def test_first_hits_are_those_of_slabs():
     hit = (enter <= leave) & (first > 0)
     assert ((which >= 0) == hit).all() and hit.sum() > 20
     assert np.allclose(depth[hit], first[hit])
+
+
+def test_warming_up_reaches_what_is_compiled():
+    warm_up()
+    assert first_hits.signatures and _grow.signatures and _window_planes.signatures
