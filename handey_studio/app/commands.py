@@ -241,7 +241,7 @@ class PointAt:
 
     def apply(self, state: State) -> State:
         session = state.session
-        if session.scene is None or state.model.open:
+        if session.scene is None or state.modelling:
             return state
         there = hypotheses_at(session.scene, session.parts, wired(state), self.origin, self.direction)
         if there:

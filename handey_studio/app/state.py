@@ -186,6 +186,11 @@ class State:
         return self.handled.handling if self.handled is not None and same(self.to_handle, self.handled.asked) else None
 
     @property
+    def modelling(self) -> bool:
+        """Whether the scene shows a model in the making, and not the MOVE."""
+        return self.model.open and self.session.draft is not None
+
+    @property
     def unsaved(self) -> bool:
         """Whether something worth keeping differs from the file. How one looks at it is not worth a question."""
         return self.saved is None or kept(self.saved) != kept(self.session)

@@ -147,11 +147,12 @@ class Workbench:
     def _turn(self, old: State) -> None:
         """When the model is opened or closed, its tab or that of the MOVE comes to the front, and the cameras go there or back."""
         new = self.state
-        if old.model.open == new.model.open:
+        if old.model.open != new.model.open:
+            for client in self.server.get_clients().values():
+                show_tab(client, "Model" if new.model.open else "Move")
+        if old.modelling == new.modelling:
             return
-        for client in self.server.get_clients().values():
-            show_tab(client, "Model" if new.model.open else "Move")
-        if new.model.open:
+        if new.modelling:
             self._before = old.session.view
             turn_to_model(self)
         else:

@@ -92,7 +92,7 @@ def operation_from_plain(plain: Any, index: int) -> Operation:
 def _plain_scan(scan: Scan) -> dict[str, Any]:
     view = scan.view
     shown = next(name for name, kind in PROJECTIONS.items() if isinstance(view.projection, kind))
-    rest = {"noise": view.noise, "outline_error": view.outline_error}
+    rest = to_plain({"noise": view.noise, "outline_error": view.outline_error})
     arrays = to_plain({"depth": view.depth, "T_world_sensor": view.T_world_sensor})
     return {"name": scan.name, "source": scan.source, "projection": {"kind": shown} | to_plain(view.projection)} | rest | arrays
 

@@ -20,6 +20,8 @@ class Accept:
     def apply(self, state: State) -> State:
         if derived.draft_of(state) is None:
             return state
+        if state.model.trial is not None:
+            return replace(state, model=replace(state.model, trial=None))
         if state.model.tool != SELECT:
             return FinishTool().apply(state)
         if proposals(derived.alignment(state)):
@@ -49,6 +51,8 @@ def accept_label(state: State) -> str:
     """What the blue button does now; empty when there is nothing to accept."""
     if derived.draft_of(state) is None or state.job is not None:
         return ""
+    if state.model.trial is not None:
+        return "Back to the model"
     if state.model.tool != SELECT:
         return TOOL_LABELS.get(state.model.tool, "") if state.model.tool in FINISHED else ""
     if proposals(derived.alignment(state)):

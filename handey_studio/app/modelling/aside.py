@@ -17,4 +17,4 @@ def _emptied(state: State) -> State:
 
 def aside(state: State) -> State:
     """The state itself, or while a model is open one of which the MOVE's scene shows nothing but what it looks up in `State.model`."""
-    return _emptied(state) if state.model.open else state
+    return _emptied(state) if state.modelling else state

@@ -23,7 +23,7 @@ SUGGESTION, ALIGNMENT, TRUTH, GRASPS, TRIAL = "suggestion", "alignment", "truth"
 
 def draft_of(state: State) -> Draft | None:
     """The model in the making, while it is looked at."""
-    return state.session.draft if state.model.open else None
+    return state.session.draft if state.modelling else None
 
 
 def built(state: State) -> Built | None:

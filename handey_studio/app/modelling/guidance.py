@@ -59,10 +59,10 @@ def _about_trial(state: State, scan: Scan) -> tuple[str, str, str]:
         words = "The localizer failed; the log tells why." if failed else f'In "{scan.source}", by its edges and surfaces.'
         return "Looking for the model …", words, "bad" if failed else "info"
     if not found.poses:
-        return "Not found there", f"{found.reason} Esc goes back to the model.", "bad"
+        return "Not found there", f"{found.reason}", "bad"
     best = found.poses[0]
     times = f"{len(found.poses)} times, best" if len(found.poses) > 1 else "once,"
-    words = f"{times} with a probability of {100 * best.score:.0f} % and {1e3 * best.surface_rms_m:.1f} mm rms. Esc goes back to the model."
+    words = f"{times} with a probability of {100 * best.score:.0f} % and {1e3 * best.surface_rms_m:.1f} mm rms."
     return "Found there", words[0].upper() + words[1:], "good"
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from handey_studio.app.actions import OpenSession
 from handey_studio.app.jobs import JobStarted
 from handey_studio.app.modelling.look import SELECT, ModelLook, Waiting
 from handey_studio.app.planner import Run
@@ -16,6 +17,7 @@ from handey_studio.session.model_files import Upload
 from handey_studio.session.modelling import scan_cell, turn_over
 
 NAME = "part"
+EXAMPLE = "model_a_part"
 MAX_UPLOAD_BYTES = 64_000_000
 BUSY = "the planner is at work; cancel first or wait for it."
 
@@ -91,7 +93,16 @@ def with_new_scan(state: State, scan: Scan) -> State:
 
 def fresh(look: ModelLook) -> ModelLook:
     """Looking at a model anew: what was set stays, what was clicked and picked goes."""
-    return ModelLook(open=look.open, settings=look.settings, material=look.material, unit=look.unit, patches=look.patches)
+    kept = {"settings": look.settings, "material": look.material, "unit": look.unit, "patches": look.patches, "saves": look.saves}
+    return ModelLook(open=look.open, part=look.part, **kept)
+
+
+@dataclass(frozen=True)
+class StartExample:
+    """The bundled session with an object to model, scanned right away."""
+
+    def run(self, bench: Any) -> State:
+        return SCAN_CELL.given(bench, OpenSession(EXAMPLE).run(bench))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from handey_studio.app.state import State
 from handey_studio.modeling.patches import Patches
 
 AWAY = np.array([0.42, -0.80, 0.72])  # from the front, the side and above
-DISTANCES = 3.0  # extents of an object from which one looks at it
+DISTANCES = 2.7  # extents of an object from which one looks at it
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,10 @@ def back_to_select(state: State) -> State:
 
 
 def _snap_options(state: State) -> SnapOptions:
-    """Planes are what some tools are about; others look for corners and edges first."""
+    """Planes are what some tools are about; others look for corners and edges first. A model is selected through its scans."""
+    draft, shown = draft_of(state), built(state)
+    if state.model.tool == SELECT and draft is not None and shown is not None and shown.solid is not None:
+        return SnapOptions(scans=None if wants_suggestion(draft) or unaligned(draft) is not None else ())
     planes_first = state.model.tool == EXTRUDE or (state.model.tool == SKETCH and state.model.drawing is None)
     return SnapOptions(kinds=("plane",)) if planes_first else SnapOptions()
 

@@ -58,19 +58,18 @@ class WorkedOut:
         return replace(state, model=replace(state.model, worked=(*others, (self.name, self.worked))))
 
 
+@dataclass(frozen=True)
+class Task:
+    """One thing that is worked out: what a state wants, the work, and the command that tells the outcome, as in `Background`."""
+
+    wanted: Callable[[State], tuple | None]
+    work: Callable[..., Any]
+    told: Callable[[tuple, Any], Any]
+
+
 def modelling_workers(send: Callable[[Any], None]) -> tuple[Background, ...]:
     """One worker for each thing that a model wants worked out."""
-    segmenter = Background(send, derived.to_segment, patches_of, lambda asked, found: Segmented(Worked(asked, found)))
-    reader = Background(send, _to_read, scan_of_upload, lambda asked, said: ScanRead(asked[0], said))
-    return (
-        segmenter,
-        reader,
-        _worker(send, derived.ALIGNMENT, derived.to_align, aligned),
-        _worker(send, derived.SUGGESTION, derived.to_suggest, suggested),
-        _worker(send, derived.TRUTH, derived.to_judge, judged),
-        _worker(send, derived.TRIAL, derived.to_try, located),
-        _worker(send, derived.GRASPS, derived.to_grasp, counted_grasps),
-    )
+    return tuple(Background(send, task.wanted, task.work, task.told) for task in TASKS)
 
 
 def aligned(
@@ -122,5 +121,16 @@ def _to_read(state: State) -> tuple | None:
     return None if state.model.reading is None else (state.model.reading,)
 
 
-def _worker(send: Callable[[Any], None], name: str, wanted: Callable[[State], tuple | None], work: Callable[..., Any]) -> Background:
-    return Background(send, wanted, work, lambda asked, found: WorkedOut(name, Worked(asked, found)))
+def _named(name: str, wanted: Callable[[State], tuple | None], work: Callable[..., Any]) -> Task:
+    return Task(wanted, work, lambda asked, found: WorkedOut(name, Worked(asked, found)))
+
+
+TASKS = (
+    Task(derived.to_segment, patches_of, lambda asked, found: Segmented(Worked(asked, found))),
+    Task(_to_read, scan_of_upload, lambda asked, said: ScanRead(asked[0], said)),
+    _named(derived.ALIGNMENT, derived.to_align, aligned),
+    _named(derived.SUGGESTION, derived.to_suggest, suggested),
+    _named(derived.TRUTH, derived.to_judge, judged),
+    _named(derived.TRIAL, derived.to_try, located),
+    _named(derived.GRASPS, derived.to_grasp, counted_grasps),
+)

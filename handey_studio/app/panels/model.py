@@ -12,7 +12,7 @@ from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.accepting import Accept, accept_label
 from handey_studio.app.modelling.guidance import model_step
 from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE, TO_TABLE
-from handey_studio.app.modelling.scanning import SCAN_CELL, TURN_OVER, CloseModel, NewModel, OpenModel, SetUnit, UploadScan
+from handey_studio.app.modelling.scanning import SCAN_CELL, TURN_OVER, CloseModel, NewModel, OpenModel, SetUnit, StartExample, UploadScan
 from handey_studio.app.modelling.steps import ConfirmPicked, OtherAlignment
 from handey_studio.app.modelling.tools import BOX, CUT, EXTRUDE, MIRROR, POINTS, SKETCH, ChooseTool, SetTool
 from handey_studio.app.modelling.typed import Typed, typed_options
@@ -42,8 +42,8 @@ class ModelPanel:
         self._add_parameters(gui)
         self._picked = gui.add_html("")
         self._add_typed(gui)
-        self._undo = gui.add_button("Undo", icon=viser.Icon.ARROW_BACK_UP, disabled=True)
-        self._redo = gui.add_button("Redo", icon=viser.Icon.ARROW_FORWARD_UP, disabled=True)
+        self._undo = gui.add_button("Undo", icon=viser.Icon.ARROW_BACK_UP, color="gray", disabled=True)
+        self._redo = gui.add_button("Redo", icon=viser.Icon.ARROW_FORWARD_UP, color="gray", disabled=True)
         self._add_sources(gui)
         self._wire(send)
 
@@ -71,11 +71,15 @@ class ModelPanel:
             )
             self._upload = gui.add_upload_button(
                 "Upload a scan",
+                color=palette.ARM_DARK,
                 icon=viser.Icon.UPLOAD,
                 mime_type=".png,.json,.npy,.ply,.pcd",
                 hint="PNG with its camera (JSON), NPY, PLY, PCD",
             )
             self._unit: Any = gui.add_dropdown("Clouds in", ("m", "cm", "mm"))
+        self._example = gui.add_button(
+            "Start from an example", icon=viser.Icon.SCHOOL, color="gray", hint="An object to model"
+        )
         self._open = gui.add_button("Continue the model", icon=viser.Icon.CUBE, color=palette.ARM_DARK, visible=False)
         self._close = gui.add_button("Back to MOVE", icon=viser.Icon.ROBOT, color="gray", visible=False)
         self._new = gui.add_button("New model", icon=viser.Icon.FILE_PLUS, color="gray", visible=False)
@@ -88,6 +92,7 @@ class ModelPanel:
             (self._confirm, ConfirmPicked()),
             (self._scan, SCAN_CELL),
             (self._turn, TURN_OVER),
+            (self._example, StartExample()),
             (self._open, OpenModel()),
             (self._close, CloseModel()),
             (self._new, NewModel()),
@@ -182,8 +187,9 @@ class ModelPanel:
         set_to(self._turn, disabled=busy, visible=bool(state.session.workcell.setup.bodies))
         set_to(self._upload, disabled=state.model.reading is not None)
         set_to(self._unit, value=state.model.unit)
+        set_to(self._example, visible=draft is None, disabled=busy)
         set_to(self._open, visible=draft is not None and not state.model.open)
-        set_to(self._close, visible=state.model.open)
+        set_to(self._close, visible=state.modelling)
         set_to(self._new, visible=draft is not None)
 
 
@@ -201,5 +207,5 @@ def _usable(state: State) -> tuple[str, ...]:
 def _looks(state: State) -> tuple:
     look = state.model
     tool = look.open, look.tool, look.clicks, look.drawing, look.picked, look.settings, look.step, look.alternative
-    under_way = look.worked, look.patches, look.reading, look.waiting, look.unit
+    under_way = look.worked, look.patches, look.reading, look.waiting, look.unit, look.trial
     return (*map(id, tool), *map(id, under_way), id(state.session.draft), state.loads, state.job, state.undo, state.redo)

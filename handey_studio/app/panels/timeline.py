@@ -36,8 +36,8 @@ class TimelinePanel:
         on_click(self._buttons, send, _pressed)
 
     def render(self, old: State | None, new: State) -> None:
-        if old is not None and old.model.open != new.model.open:
-            self._panel.minimize() if new.model.open else self._panel.expand()
+        if old is not None and old.modelling != new.modelling:
+            self._panel.minimize() if new.modelling else self._panel.expand()
         if old is not None and _looks(old) == _looks(new):
             return
         replay, time_s = new.replay, new.session.view.time_s

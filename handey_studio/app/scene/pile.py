@@ -46,7 +46,7 @@ class PileScene:
 
 
 def _shown(state: State) -> bool:
-    return state.session.scan is None and not state.model.open
+    return state.session.scan is None and not state.modelling
 
 
 def solid_of(session: Session, library: Library, body: TrueBody) -> Part | None:

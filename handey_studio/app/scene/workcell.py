@@ -25,7 +25,7 @@ class WorkcellScene:
         _light(server)
 
     def render(self, old: State | None, new: State) -> None:
-        self._root.visible = not new.model.open
+        self._root.visible = not new.modelling
         if old is not None and old.session.workcell is new.session.workcell:
             return
         scene, workcell = self._server.scene, new.session.workcell

@@ -56,10 +56,10 @@ class ClickScenes:
         if snap.kind == "plane" and snap.number < len(shown.solid.faces):
             corners = face_corners(shown.solid, [snap.number]) + 2e-4 * snap.normal
             numbers = np.arange(len(corners)).reshape(-1, 3)
-            self._scene.add_mesh_simple(f"{name}/face", scaled(corners), numbers, color=palette.BLUE, opacity=0.55, side="double")
+            self._scene.add_mesh_simple(f"{name}_face", scaled(corners), numbers, color=palette.BLUE, opacity=0.55, side="double")
         elif snap.kind == "edge" and snap.number < len(shown.solid.edges):
             edge = shown.solid.edges[snap.number]
-            self._lines(f"{name}/edge", shown.solid.vertices[[edge.start, edge.end]][None], palette.BLUE, 6.0)
+            self._lines(f"{name}_edge", shown.solid.vertices[[edge.start, edge.end]][None], palette.BLUE, 6.0)
 
     def _add_drawing(self, drawing: Drawing) -> None:
         """The outline so far, each side with what it was taken to mean."""
@@ -73,7 +73,8 @@ class ClickScenes:
         if len(corners) > 1:
             self._lines(f"{ROOT}/sides", np.stack([corners[:-1], corners[1:]], axis=1), palette.BLUE, 3.5)
         for side in range(len(corners) - 1):
-            words = " ".join(c.told for c in stroke.constraints if c.on and c.item == side and c.kind not in ("at", "on line"))
+            meant = [c for c in stroke.constraints if c.on and c.item == side and c.kind not in ("at", "on line")]
+            words = " ".join(c.told.removesuffix("horizontal").removesuffix("vertical").strip() for c in meant)
             length = float(np.linalg.norm(corners[side + 1] - corners[side]))
             self._label(f"{ROOT}/side{side}", (corners[side] + corners[side + 1]) / 2.0, f"{1e3 * length:.1f} mm {words}".strip())
 
