@@ -235,10 +235,8 @@ def test_steps_are_looked_at_taken_out_and_refused_while_an_earlier_one_is_shown
 def test_an_assumed_face_is_confirmed(carton):
     shown = derived.built(carton.state)
     assumed = [f for f, source in enumerate(shown.sources) if source.startswith("assumed")]
-    seen = [f for f in assumed if shown.solid.normals[f] @ (EYE - shown.solid.vertices[shown.solid.faces[f].outer[0]]) > 0]
-    if not seen:
-        pytest.skip("every face that this eye sees was seen")
-    carton.click(shown.solid.vertices[list(shown.solid.faces[seen[0]].outer)].mean(axis=0))
+    face = shown.solid.vertices[list(shown.solid.faces[assumed[0]].outer)].mean(axis=0)
+    carton.do(ClickScene(Ray(face + 0.3 * shown.solid.normals[assumed[0]], -shown.solid.normals[assumed[0]], 0.0006)))
     carton.do(ConfirmPicked())
     assert len([s for s in derived.built(carton.state).sources if s.startswith("assumed")]) == len(assumed) - 1
 
