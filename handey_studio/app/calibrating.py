@@ -19,6 +19,7 @@ from handey_studio.session.run import station_of
 from handey_studio.task.calibrate import CalibrateOptions, RangeCalibration, calibrate_range
 from handey_studio.world import Library
 
+CALIBRATED = 1e-3  # what is less off, in metres or as a share of a right angle, was calibrated well
 MOST_OFF_M, MOST_TURN_RAD = 0.009, np.deg2rad(1.5)  # of a misplacement that is drawn by chance
 
 
@@ -46,9 +47,7 @@ def calibration_done(state: State, found: RangeCalibration) -> State:
     """The state when a calibration has ended: what was found waits to be accepted."""
     if found.fit is None:
         return replace(state, calibration=found).told(f"The calibration failed: {found.reason}", "bad")
-    return replace(state, calibration=found).told(
-        "The range finder's frame was found. Accept it, or discard it, in the Cell tab.", "planned"
-    )
+    return replace(state, calibration=found).told("The range finder's frame was found. Accept it, or discard it, in the Cell tab.", "good")
 
 
 @dataclass(frozen=True)
@@ -90,4 +89,4 @@ class Misplace:
 def is_misplaced(state: State) -> bool:
     """Whether the simulated range finder was moved on purpose, and not yet calibrated since."""
     T = state.session.workcell.setup.T_range_offset
-    return not np.allclose(T, np.eye(4), atol=1e-9)
+    return not np.allclose(T, np.eye(4), atol=CALIBRATED)

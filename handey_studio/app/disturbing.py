@@ -13,7 +13,7 @@ from handey_studio.session import Session
 from handey_studio.session.destination import destination_pose
 
 MAX_FAULTS = 12
-FOR_A_MOMENT_S = 0.15  # a push
+FOR_A_MOMENT_S, SLIP_S = 0.15, 1.5  # a push, and the time in which a part slips or falls
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Kind:
 
 
 KINDS = (
-    Kind("slip", "The friction between fingers and part falls to this share.", "Friction left (%)", 0.0, 10.0, 100.0, "follow", 4),
+    Kind("slip", "For a moment the friction between fingers and part falls to this.", "Friction left (%)", 0.0, 0.0, 100.0, "follow", 4),
     Kind("push", "A force shoves what the hand holds sideways.", "Force (N)", 1.0, 25.0, 200.0, "follow", 4),
     Kind("bias", "The next scan comes out shifted along x.", "Shift (mm)", -50.0, 6.0, 50.0, "scan", 1),
     Kind("obstacle", "A cube that no scan has seen stands on the way to the destination.", "Side (mm)", 10.0, 60.0, 200.0, "follow", 1),
@@ -99,7 +99,7 @@ def fault_of(asked: AddFault, session: Session) -> Fault:
         raise BadInput(f"{kind.size} is {asked.size:g}; it must be from {kind.least:g} to {kind.most:g}.")
     when = {"call": asked.call, "count": max(1, asked.count), "time_s": max(0.0, asked.after_s)}
     if kind.name == "slip":
-        return Fault("slip", **when, size=asked.size / 100.0)
+        return Fault("slip", **when, lasts_s=SLIP_S, size=asked.size / 100.0)
     if kind.name == "push":
         return Fault("push", **when, lasts_s=FOR_A_MOMENT_S, vector=np.array([0.0, asked.size, 0.0]))
     if kind.name == "bias":

@@ -1,7 +1,7 @@
 """The plan that is looked at, downloaded for a robot controller."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from handey_studio.app.actions import Bench
 from handey_studio.app.state import State
@@ -30,5 +30,6 @@ def exported(state: State, form: str) -> str:
     told, result = state.attempt, state.session.result
     if told is None or result is None:
         raise BadInput("there is no plan to export yet; press Plan first.")
-    report = move_report([result], state.robot)
+    planned = replace(result, status="planned", reason="", plan=told.plan, performance=None, attempts=())
+    report = move_report([planned], state.robot)
     return program_text(program_from_move(json.dumps(report).encode()), state.robot, form)[0]

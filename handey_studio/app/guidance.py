@@ -38,8 +38,13 @@ def next_step(state: State) -> tuple[str, str, str]:
         return "Cancelled", "What was found so far is shown. Press Plan or MOVE to start again.", "quiet"
     if result.status == "failed":
         if result.performances:
-            return "It was not done", f"{result.reason} What happened is told on the right, under Result.", "bad"
-        return "No plan was found", f"{result.reason} The ledger tells what was tried; another destination may do.", "bad"
+            return "It was not done", f"{_sentence(result.reason)} What happened is told on the right, under Result.", "bad"
+        return "No plan was found", f"{_sentence(result.reason)} The ledger tells what was tried; another destination may do.", "bad"
     if result.status == "planned":
         return "Planned: look before it moves", "Play or scrub the timeline. MOVE carries it out.", "good"
     return "Done", "The part was moved. Choose where it goes next, or save the session.", "good"
+
+
+def _sentence(reason: str) -> str:
+    """A reason as a sentence of its own."""
+    return f"{reason.rstrip('.')}."

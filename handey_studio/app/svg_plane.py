@@ -39,12 +39,13 @@ def grasp_plane_svg(
     part: Part | None = None,
     putdown: GraspPlane | None = None,
     obstacles: str = PICKUP,
+    way_out: NDArray | None = None,
 ) -> str:
     """Cells filled for the fingers (dark) and the crosspiece (light), the part, the hand at the start and at point `at`, its bump lines
     at the iteration nearest to that, the path.
 
     World up is up in the picture as far as the plane allows. `putdown` is the grasp plane at the putdown, carried back by the inverse of
-    the part's motion: it shares y and z with the pickup's.
+    the part's motion: it shares y and z with the pickup's; `way_out` (n, 2) [m] is how the hand leaves there, carried back as well.
     """
     view = PlaneView(run.plane.T_world_plane, (run.path[-1, :2] + run.path[0, :2]) / 2.0, VIEW_M, SIZE)
     layers = [] if obstacles == PUTDOWN and putdown is not None else [_cells(view, run.plane, FILLED, palette.PALE)]
@@ -52,6 +53,8 @@ def grasp_plane_svg(
         layers.append(_cells(view, putdown, palette.PUTDOWN, PALE_PUTDOWN, 0.75 if layers else 1.0))
     if grasp is not None and part is not None:
         layers.append(part_in_plane(part, grasp.T_part_plane, view))
+    if way_out is not None and len(way_out):
+        layers.append(polyline(view.pixels(way_out), palette.PUTDOWN, 2.5, dash="5 3"))
     pose = run.path[at]
     layers += [_hand(view, hand, run.path[0], palette.GREY, 0.10), polyline(view.pixels(run.path[:, :2]), palette.BLUE, 2.5)]
     layers += [_hand(view, hand, pose, palette.TEAL, 0.45), *_iteration(view, run, hand, pose)]
@@ -65,7 +68,8 @@ def plane_chips(obstacles: str) -> list[tuple[RGB, str]]:
     putdown = [(palette.PUTDOWN, "the same at the putdown"), (PALE_PUTDOWN, "crosspiece there")]
     shown = [*(pickup if obstacles != PUTDOWN else []), *(putdown if obstacles != PICKUP else [])]
     rest = [(palette.TEAL, "hand"), (palette.BLUE, "its path, free motion vector"), (palette.ORANGE, "bump lines, vectors × multiplier")]
-    return [*shown, *rest, (palette.VERMILLION, "bump lines that touch; grasp point")]
+    out = (palette.PUTDOWN, "dashed: its way out at the putdown")
+    return [*shown, *rest, out, (palette.VERMILLION, "bump lines that touch; grasp point")]
 
 
 def plane_words(run: BumpRun, hand: Hand, at: int) -> str:

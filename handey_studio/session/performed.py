@@ -48,13 +48,13 @@ class PerformedReplay(Replay):
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
-        """The motions that were made; what led back after an incident counts to the step before it."""
+        """The motions that were made."""
         starts = [one.start_s for one in self.performance.performed]
         last = self.performance.performed[-1]
         ends = [*starts[1:], last.start_s + float(last.recording.time_s[-1])]
         steps = np.maximum.accumulate([max(one.step, 0) for one in self.performance.performed]).tolist()
         told = zip(self.performance.performed, steps, starts, ends, strict=True)
-        return tuple(Stretch(one.what, step, start, end) for one, step, start, end in told)
+        return tuple(Stretch(one.what, step, start, end, one.step < 0) for one, step, start, end in told)
 
     def at(self, time_s: float) -> Moment:
         """What was measured at a time [s], which is clipped to the attempt's."""
@@ -112,7 +112,7 @@ class PerformedReplay(Replay):
         times, opening = self.traces.time_s, self.traces.opening_m
         opened = times[(times > start) & (opening > width + LET_GO_M)]
         end = float(opened[0]) if len(opened) else self.duration + 1.0
-        fell = [stretch.end for stretch in self.stretches if stretch.step in gone and start <= stretch.end <= end]
+        fell = [stretch.end for stretch in self.stretches if stretch.step in gone and not stretch.back and start <= stretch.end <= end]
         return (min(fell), True) if fell else (end, False)
 
     def _place(self, time_s: float, q: NDArray, hold: Hold | None) -> NDArray:
@@ -159,5 +159,5 @@ def replay_of(robot: Robot, told: Told) -> Replay:
 
 def seconds_of(replay: Replay, step: int) -> float:
     """When what was noticed at a plan's step was noticed [s]: at its end; before the first step and after the last at the ends."""
-    ends = [stretch.end for stretch in replay.stretches if stretch.step == step]
+    ends = [stretch.end for stretch in replay.stretches if stretch.step == step and not stretch.back]
     return ends[-1] if ends else (0.0 if step < 0 else replay.duration)

@@ -30,12 +30,13 @@ class Moment(Value):
 @dataclass(frozen=True)
 class Stretch:
     """A piece of the timeline [s]: a step of the plan, or one of the motions that a step was carried out by. `what` is the step's kind, or
-    what was done besides; `step` counts the plan's steps."""
+    what was done besides; `step` counts the plan's steps. What leads `back` after an incident counts to the step before it."""
 
     what: str
     step: int
     start: float
     end: float
+    back: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ class ViewState(Value):
     """
 
     camera_position: NDArray = field(default_factory=lambda: np.array([1.56, -1.10, 0.98]))
-    camera_look_at: NDArray = field(default_factory=lambda: np.array([0.29, 0.01, 0.16]))
+    camera_look_at: NDArray = field(default_factory=lambda: np.array([0.31, 0.01, 0.05]))
     time_s: float = 0.0
     hypothesis: int = -1
     edge: int = -1

@@ -15,6 +15,7 @@ from handey_studio.session.sequence import next_command, states_of
 from handey_studio.session.session import CommandState
 
 ROWS = 16  # that are listed at once, around the one that is chosen
+TWO_LINES = "display:-webkit-box;-webkit-line-clamp:2;-webkit-box-orient:vertical;overflow:hidden"
 ADD, REMOVE, UP, DOWN = "Add", "Remove", "▲", "▼"
 SKIP, OVER = "Skip", "Start over"
 PRESSED = {ADD: AddCommand(), REMOVE: RemoveCommand(), UP: ShiftCommand(-1), DOWN: ShiftCommand(1), SKIP: SkipCommand(), OVER: StartOver()}
@@ -85,7 +86,7 @@ def _row(state: State, number: int, told: CommandState, button: str) -> str:
     clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     why = state.session.results[told.result].reason if told.result >= 0 else ""
     below = (
-        f'<div style="color:{css(palette.VERMILLION)};padding-left:34px;font-size:11.5px">{html.esc(why)}</div>'
+        f'<div style="color:{css(palette.VERMILLION)};padding-left:34px;font-size:11.5px;{TWO_LINES}">{html.esc(why)}</div>'
         if told.status == "failed"
         else ""
     )

@@ -16,6 +16,7 @@ from handey_studio.app.svg_table import layout_of, table_html
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.grasping import Grip
 from handey_studio.session.handling import fates, way_through
+from handey_studio.session.way_out import way_out
 from handey_studio.task.plan import GraspChoice
 
 NO_GRASP = "No grasp yet. Press Plan: this then shows which faces are held, how the hand comes in, and what stood in its way."
@@ -77,7 +78,8 @@ class GraspPanel:
         which = state.grasp_look.obstacles if putdown is not None else PICKUP
         set_to(self._obstacles, value=state.grasp_look.obstacles)
         part = state.session.part(state.replay.plan.part)
-        picture = grasp_plane_svg(carry.approach, state.robot.hand, at, carry.grasp, part, putdown, which)
+        out = way_out(state.robot, state.replay.plan, carry)
+        picture = grasp_plane_svg(carry.approach, state.robot.hand, at, carry.grasp, part, putdown, which, out)
         self._plane.content = html.figure(picture, plane_chips(which), plane_words(carry.approach, state.robot.hand, at))
 
     def _render_part(self, state: State) -> None:

@@ -95,7 +95,7 @@ def now_playing(state: State) -> str:
     stretch = replay.stretch_at(moment.time_s)
     count = len(state.attempts)
     attempt = f"attempt {state.attempt_number + 1} of {count} · " if count > 1 else ""
-    step = f"step {stretch.step + 1} of {len(replay.plan.steps)}: {stretch.what}"
+    step = stretch.what if stretch.back else f"step {stretch.step + 1} of {len(replay.plan.steps)}: {stretch.what}"
     held = f", holding {moment.held}" if moment.held else ", nobody knows where the part is" if moment.lost else ""
     return f"{'▶' if state.playing else '❚❚'} {moment.time_s:.2f} of {replay.duration:.2f} s · {attempt}{step}{held}"
 
@@ -103,7 +103,7 @@ def now_playing(state: State) -> str:
 def _box(stretch: Stretch, now: bool, total: float) -> str:
     share = 100.0 * (stretch.end - stretch.start) / total
     name = stretch.what if share > 100 * 6.5 * len(stretch.what) / (WIDTH - 40) else ""
-    colour = css(STEP_COLOURS.get(stretch.what, STEP_COLOURS[OTHER]))
+    colour = css(STEP_COLOURS.get(stretch.what.split(",")[0], STEP_COLOURS[OTHER]))
     return (
         f'<div title="{html.esc(stretch.what)} {stretch.end - stretch.start:.1f} s" style="width:{share:.3f}%;background:{colour};'
         f'opacity:{1.0 if now else 0.55};overflow:hidden;white-space:nowrap;text-align:center;border-right:1px solid #fff">'
