@@ -12,6 +12,7 @@ from handey_studio.app.modelling.accepting import Accept, Escape, accept_label
 from handey_studio.app.modelling.guidance import model_step
 from handey_studio.app.modelling.look import BY_HEIGHT
 from handey_studio.app.modelling.parts import EditPart, NameModel, SavePart, modelled_part
+from handey_studio.app.modelling.plane_tools import measurement
 from handey_studio.app.modelling.scanning import CloseModel, NewModel, OpenModel, UploadScan, with_new_scan
 from handey_studio.app.modelling.steps import (
     ConfirmPicked,
@@ -24,7 +25,8 @@ from handey_studio.app.modelling.steps import (
     SetPicked,
     TakeModel,
 )
-from handey_studio.app.modelling.tools import BOX, CUT, EXTRUDE, MEASURE, MIRROR, SKETCH, ChooseTool, ClickScene, SetTool, measurement
+from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, SKETCH
+from handey_studio.app.modelling.tools import ChooseTool, ClickScene, SetTool
 from handey_studio.app.modelling.typed import typed_options
 from handey_studio.app.modelling.workers import TASKS
 from handey_studio.app.state import State, opened

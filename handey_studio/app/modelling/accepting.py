@@ -6,7 +6,8 @@ from handey_studio.app.actions import Bench, CancelMove
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import SELECT
 from handey_studio.app.modelling.steps import AcceptAlignment, TakeModel
-from handey_studio.app.modelling.tools import CUT, EXTRUDE, FINISHED, MIRROR, POINTS, SKETCH, ChooseTool, FinishTool
+from handey_studio.app.modelling.tool_clicks import CUT, EXTRUDE, MIRROR, POINTS, SKETCH
+from handey_studio.app.modelling.tools import FINISHED, ChooseTool, FinishTool
 from handey_studio.app.state import State
 from handey_studio.session.model_look import proposals
 

@@ -2,7 +2,8 @@
 
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE
-from handey_studio.app.modelling.tools import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH, measurement, tool_plane
+from handey_studio.app.modelling.plane_tools import measurement, tool_plane
+from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH
 from handey_studio.app.state import State
 from handey_studio.base import measured
 from handey_studio.modeling.scans import Scan

@@ -14,7 +14,8 @@ from handey_studio.app.modelling.guidance import model_step
 from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE, TO_TABLE
 from handey_studio.app.modelling.scanning import SCAN_CELL, TURN_OVER, CloseModel, NewModel, OpenModel, SetUnit, StartExample, UploadScan
 from handey_studio.app.modelling.steps import ConfirmPicked, OtherAlignment
-from handey_studio.app.modelling.tools import BOX, CUT, EXTRUDE, MIRROR, POINTS, SKETCH, ChooseTool, SetTool
+from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MIRROR, POINTS, SKETCH
+from handey_studio.app.modelling.tools import ChooseTool, SetTool
 from handey_studio.app.modelling.typed import Typed, typed_options
 from handey_studio.app.panels.move import choose
 from handey_studio.app.panels.tools import TOOLS, toolbar

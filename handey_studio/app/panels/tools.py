@@ -2,7 +2,7 @@
 
 from handey_studio.app import html, palette
 from handey_studio.app.modelling.look import SELECT
-from handey_studio.app.modelling.tools import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH
+from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH
 from handey_studio.app.palette import css
 
 TOOLS = (SELECT, BOX, SKETCH, EXTRUDE, CUT, MIRROR, MEASURE, POINTS)

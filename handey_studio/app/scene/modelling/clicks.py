@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from handey_studio.app import palette
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import Drawing
-from handey_studio.app.modelling.tools import CUT, MIRROR, ClickScene, measurement, tool_plane
+from handey_studio.app.modelling.plane_tools import measurement, tool_plane
+from handey_studio.app.modelling.tool_clicks import CUT, MIRROR
+from handey_studio.app.modelling.tools import ClickScene
 from handey_studio.app.scene.modelling.solid import face_corners
 from handey_studio.app.scene.units import metres, scaled
 from handey_studio.app.state import State
