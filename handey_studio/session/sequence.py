@@ -1,5 +1,6 @@
 """A session's commands as a list that is run: all of them, one at a time, and on from where it stopped."""
 
+from collections import Counter
 from dataclasses import replace
 
 from handey_studio.base import Share
@@ -76,11 +77,12 @@ def _one(session: Session, number: int, station: Station, cell: Cell, scene: Sce
 
 
 def _settled(session: Session, number: int) -> tuple[tuple[str, float, float, float], ...]:
-    """Where the commands that are done put their parts."""
+    """Where the commands that are done put their parts: a later command means another one, if there were ever several of the kind."""
+    counts = Counter(placed.part.name for placed in session.located)
     found = []
     for k, state in enumerate(states_of(session)):
         T = session.results[state.result].T_world_part_reached if state.status == "done" and k != number else None
-        if T is not None:
+        if T is not None and counts[base_name(session.commands[k].part)] > 1:
             found.append((base_name(session.commands[k].part), *T[:3, 3].tolist()))
     return tuple(found)
 

@@ -67,7 +67,7 @@ def _row(seed: int, pile: Pile, library: Library) -> dict[str, Any]:
     cell = simulated_cell(pile.workcell, library)
     before = cell.true_scene()
     begun = time.perf_counter()
-    once = RecoveryOptions(attempts=1, look_again=False)  # the first plan is what is judged
+    once = RecoveryOptions(attempts=1, looks=1, look_again=False)  # the first plan is what is judged
     outcome = run_move(station, cell, MoveCommand(pile.part, pile.to), MoveOptions(seed=seed), recovery=once)
     scene, result = outcome.scene, outcome.result
     total = time.perf_counter() - begun

@@ -94,21 +94,36 @@ def _lesson(order: Order, tried: Tried, plan: MovePlan, attempts: list[Attempt],
 
 
 def _anew(order: Order, scene: Scene, attempts: list[Attempt], tried: Tried, cell: Cell, progress: Progress) -> tuple[Scene, MoveResult]:
-    """A new scene, and a plan in it that avoids what failed; if that leaves nothing, one that does not, for the scan is new."""
-    station, options, seed = order.station, order.options, order.options.seed + len(attempts)
-    try:
-        seen = tried.after
-        if seen is None:
-            seen = understood(station, tried.seen, seed, progress) if tried.seen is not None else sense(station, cell, seed, progress)
-    except CannotAct as error:
-        return scene, MoveResult(order.command, "failed", str(error))
-    command = replace(order.command, part=_same(scene, seen, attempts[-1]) or order.command.part)
-    avoiding = replace(options, seed=seed, search=replace(options.search, ruled_out=_ruled_out(attempts)))
-    q, opening = cell.joints(), cell.opening()
-    planned = plan_in(station, seen, command, q, opening, avoiding, progress, _felt(attempts))
-    if planned.plan is None and (_ruled_out(attempts) or _felt(attempts)):
-        planned = plan_in(station, seen, command, q, opening, replace(options, seed=seed), progress)
-    return seen, replace(planned, command=order.command)
+    """A new scene and a plan in it. Where there is none another scan is taken: readings come and go with the sensor's noise."""
+    seen, planned = scene, MoveResult(order.command, "failed", "")
+    for look in range(order.recovery.looks):
+        seed = order.options.seed + len(attempts) + look
+        try:
+            seen = _seen(order.station, tried if look == 0 else Tried(), cell, seed, progress)
+        except CannotAct as error:
+            return seen, replace(planned, reason=str(error))
+        planned = _planned(order, seen, _same(scene, seen, attempts[-1]), attempts, cell, seed, progress)
+        if planned.plan is not None or progress.cancelled:
+            break
+    return seen, planned
+
+
+def _seen(station: Station, tried: Tried, cell: Cell, seed: int, progress: Progress) -> Scene:
+    """What the last scan of an attempt shows, or a new one."""
+    if tried.after is not None:
+        return tried.after
+    return understood(station, tried.seen, seed, progress) if tried.seen is not None else sense(station, cell, seed, progress)
+
+
+def _planned(order: Order, seen: Scene, part: str | None, attempts: list[Attempt], cell: Cell, seed: int, progress: Progress) -> MoveResult:
+    """A plan that avoids what failed and was felt; if that leaves nothing, one that does not, for the scan is new."""
+    q, opening, command = cell.joints(), cell.opening(), replace(order.command, part=part or order.command.part)
+    ruled_out, felt, options = _ruled_out(attempts), _felt(attempts), replace(order.options, seed=seed)
+    avoiding = replace(options, search=replace(options.search, ruled_out=ruled_out))
+    planned = plan_in(order.station, seen, command, q, opening, avoiding, progress, felt)
+    if planned.plan is None and (ruled_out or felt) and not progress.cancelled:
+        planned = plan_in(order.station, seen, command, q, opening, options, progress)
+    return replace(planned, command=order.command)
 
 
 def _same(before: Scene, now: Scene, last: Attempt) -> str | None:

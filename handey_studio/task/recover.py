@@ -20,10 +20,12 @@ FELT_SIDE_M = 0.04  # nobody knows how large it is: as large as a hand could hav
 
 @dataclass(frozen=True)
 class RecoveryOptions:
-    """`attempts` at a MOVE in all, the first among them; 1 never recovers. `look_again`: scan once more before anything moves, and compare.
-    `place` tells how far off the part may stand at the end."""
+    """`attempts` at a MOVE in all, the first among them; 1 never recovers. `looks`: scans that a plan is looked for in, as readings come
+    and go with the sensor's noise. `look_again`: scan once more before anything moves, and compare. `place` tells how far off the part
+    may stand at the end."""
 
     attempts: int = 3
+    looks: int = 2
     look_again: bool = True
     place: PlaceLimits = field(default_factory=PlaceLimits)
 

@@ -1,5 +1,7 @@
 """A whole MOVE in a cell: sense, plan, execute."""
 
+from dataclasses import replace
+
 from handey_studio.base import Progress, Share, Silent
 from handey_studio.cell.protocol import CannotAct, Cell
 from handey_studio.task.execution import Order, Outcome, carry_out
@@ -36,13 +38,17 @@ def run_move(
     scene: Scene | None = None,
 ) -> Outcome:
     """Sense (unless a scene is given that was sensed before), plan and, if wanted, execute one MOVE. Bad input raises; everything else is a
-    result."""
+    result. What is to be executed and cannot be planned is looked at once more, by another scan."""
     check_command(command, station.models)
-    try:
-        scene = scene or sense(station, cell, options.seed, Share(progress, 0.0, SENSED))
-    except CannotAct as error:
-        return Outcome(MoveResult(command, "failed", str(error)), None)
-    result = plan_in(station, scene, command, cell.joints(), cell.opening(), options, Share(progress, SENSED, PLANNED))
-    if not execute_too or result.plan is None or progress.cancelled:
+    result = MoveResult(command, "failed", "")
+    for look in range(recovery.looks if execute_too else 1):
+        try:
+            scene = scene if scene is not None and look == 0 else sense(station, cell, options.seed + look, Share(progress, 0.0, SENSED))
+        except CannotAct as error:
+            return Outcome(replace(result, reason=str(error)), None)
+        result = plan_in(station, scene, command, cell.joints(), cell.opening(), options, Share(progress, SENSED, PLANNED))
+        if result.plan is not None or progress.cancelled:
+            break
+    if scene is None or not execute_too or result.plan is None or progress.cancelled:
         return Outcome(result, scene)
     return carry_out(Order(station, command, options, recovery), scene, result, cell, Share(progress, PLANNED, 1.0))
