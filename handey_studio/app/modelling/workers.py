@@ -1,5 +1,6 @@
 """What is worked out of a model away from the loop: planar faces, suggestions, alignments, truth, and what uploaded files hold."""
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,6 +17,7 @@ from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron
 from handey_studio.grasping import grasp_classes, grasp_groups
 from handey_studio.localization import LocateResult, localize
+from handey_studio.modeling import sightlines, suggest_warm_up
 from handey_studio.modeling.align import align
 from handey_studio.modeling.patches import Patches
 from handey_studio.modeling.patches_finding import patches_of
@@ -68,8 +70,14 @@ class Task:
 
 
 def modelling_workers(send: Callable[[Any], None]) -> tuple[Background, ...]:
-    """One worker for each thing that a model wants worked out."""
+    """One worker for each thing that a model wants worked out; meanwhile what they run is compiled."""
+    threading.Thread(target=_warm_up, name="modelling-warm-up", daemon=True).start()
     return tuple(Background(send, task.wanted, task.work, task.told) for task in TASKS)
+
+
+def _warm_up() -> None:
+    sightlines.warm_up()
+    suggest_warm_up.warm_up()
 
 
 def aligned(
