@@ -23,7 +23,7 @@ def workcell() -> Workcell:
     """One brick on an empty table, in the view of a coarse range finder."""
     finder = RangeFinder(transform(None, (0.33, -0.17, 0.0)), AREA, planes=700)
     brick = TrueBody("brick", from_xyz_rpy((0.46, -0.08, 0.015), (0.0, 0.0, 0.4)), part="brick")
-    return Workcell("ur5", ("brick",), finder=finder, setup=SimulatedSetup((brick,)))
+    return Workcell("ur5", ("brick",), finder=finder, setup=SimulatedSetup((brick,), physics=False))
 
 
 class Troubled(GeometricCell):
