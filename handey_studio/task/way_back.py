@@ -19,6 +19,8 @@ from handey_studio.task.performance import Incident
 from handey_studio.task.plan import Step
 from handey_studio.world import World
 
+BACK_SPEED, EASE_S = 0.5, 0.4  # share of the plan's speed on the way back, and the time in which it is gathered
+
 
 @dataclass(frozen=True)
 class CameBack:
@@ -129,6 +131,14 @@ def _patiently(performer: Performer, what: str, go: Callable[[], Moved], q: NDAr
 
 
 def _reversed(step: Step, q: NDArray) -> Trajectory:
-    """A step backwards from the sample that is nearest to where the arm is."""
+    """A step backwards from the sample that is nearest to where the arm is: at half the speed, and from rest though it may begin midway."""
     k = int(np.argmin(np.abs(step.q_rad - q).max(axis=1))) + 1
-    return Trajectory(step.time_s[k - 1] - step.time_s[:k][::-1], step.q_rad[:k][::-1], step.hand_opening_m[:k][::-1])
+    return Trajectory(_eased(step.time_s[k - 1] - step.time_s[:k][::-1]), step.q_rad[:k][::-1], step.hand_opening_m[:k][::-1])
+
+
+def _eased(time_s: NDArray) -> NDArray:
+    """Times (n,) [s] at which a motion is where it was at `time_s` (n,), when it first gathers speed and then keeps a share of its own."""
+    gathered = BACK_SPEED * EASE_S / 2
+    return np.where(
+        time_s < gathered, np.sqrt(2.0 * EASE_S * time_s / BACK_SPEED), EASE_S + (np.maximum(time_s, gathered) - gathered) / BACK_SPEED
+    )

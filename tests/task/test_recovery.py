@@ -9,6 +9,7 @@ from handey_studio.geometry.transforms import pose_difference
 from handey_studio.session import Session, session_from_bytes, session_to_bytes
 from handey_studio.task import MoveCommand
 from handey_studio.task.report import move_report
+from handey_studio.task.way_back import _reversed
 from tests.task.troubled import GOAL, LIBRARY, Troubled, moved, station, workcell
 
 TROUBLES = ("missed", "dropped", "blocked", "early contact", "wrong place", "moved")
@@ -114,3 +115,13 @@ def test_what_happened_is_in_the_json_and_in_a_session(recovered):
     data = session_to_bytes(session)
     assert session_from_bytes(data, "x").results[0].attempts == result.attempts
     assert len(data) < 3_000_000
+
+
+def test_the_way_back_begins_at_rest_wherever_on_a_step_the_arm_was_stopped(recovered):
+    transfer = next(step for step in recovered["blocked"][1].result.plan.steps if step.kind == "transfer")
+    for k in (len(transfer.time_s) // 3, len(transfer.time_s) // 2, len(transfer.time_s) - 1):
+        back = _reversed(transfer, transfer.q_rad[k])
+        assert np.array_equal(back.q_rad, transfer.q_rad[: k + 1][::-1]) and (np.diff(back.time_s) > 0).all()
+        speed = np.abs(np.diff(back.q_rad, axis=0) / np.diff(back.time_s)[:, None]).max(axis=1)
+        planned = np.abs(np.diff(transfer.q_rad, axis=0) / np.diff(transfer.time_s)[:, None]).max()
+        assert speed.max() <= 0.5 * planned + 1e-9 and speed[0] < 0.1 * planned
