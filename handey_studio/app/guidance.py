@@ -26,7 +26,7 @@ def next_step(state: State) -> tuple[str, str, str]:
         what = "Stopping" if job.cancelling else job.title or ("Moving" if job.execute else "Planning")
         return f"{what} …", job.message, "info"
     if not session.workcell.parts:
-        return "This workcell has no part models", "Open a session that has some: Session → Open.", "quiet"
+        return "This workcell has no part models", "Model one of what lies in the cell (Model, on the left), or open a session.", "quiet"
     if state.command is None:
         return "Choose a part", "Pick the part that the arm shall move, below.", "info"
     result = session.result

@@ -83,8 +83,10 @@ let tries = 0;
 const waiting = setInterval(() => {
   const tab = [...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent.trim() === LABEL);
   if (tab) {
-    document.body.addEventListener('keydown', event => event.stopPropagation(), {once: true});
+    const kept = event => event.stopPropagation();
+    document.body.addEventListener('keydown', kept);
     tab.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter', bubbles: true}));
+    document.body.removeEventListener('keydown', kept);
   }
   if (tab || ++tries > 100) clearInterval(waiting);
 }, 100);

@@ -114,7 +114,7 @@ def test_download_and_upload_round_trip(studio, visit, tmp_path):
     press(page, "New")
     wait_until(lambda: workbench.state.session.scene is None)
     press(page, "Open")
-    page.locator('input[type="file"]').set_input_files(tmp_path / "back.handey")
+    page.get_by_role("dialog").locator('input[type="file"]').set_input_files(tmp_path / "back.handey")
     wait_until(lambda: workbench.state.session.scene is not None)
     assert workbench.state.session.scene == before.scene and workbench.state.session.results == before.results
 
@@ -124,7 +124,7 @@ def test_a_broken_upload_is_told_and_changes_nothing(studio, visit, tmp_path):
     page = visit(workbench)
     (tmp_path / "broken.handey").write_bytes(b"\x1f\x8b not a session")
     press(page, "Open")
-    page.locator('input[type="file"]').set_input_files(tmp_path / "broken.handey")
+    page.get_by_role("dialog").locator('input[type="file"]').set_input_files(tmp_path / "broken.handey")
     says(page, "broken.handey")
     assert workbench.state.session.name == "sample"
     type_into(page, "Position (mm)", "300")

@@ -22,6 +22,8 @@ def model_step(state: State) -> tuple[str, str, str]:
     if state.model.waiting is not None:
         wanted = "depth image (PNG)" if state.model.waiting.name.lower().endswith("json") else "camera (JSON)"
         return "One more file", f'Upload the {wanted} that belongs to "{state.model.waiting.name}".', "info"
+    if draft is None and state.session.draft is not None:
+        return f"The model of {state.session.draft.name}", "Continue it, or go on with a MOVE.", "quiet"
     if draft is None:
         return "Model a part", "Scan the cell or upload a scan of an object: its faces are found, and a solid is suggested.", "info"
     if state.model.trial is not None:
