@@ -15,7 +15,6 @@ from handey_studio.app.panels.looking import LookingPanel
 from handey_studio.app.panels.model import ModelPanel
 from handey_studio.app.panels.move import MovePanel
 from handey_studio.app.panels.part import PartPanel
-from handey_studio.app.panels.running import HappenedPanel
 from handey_studio.app.panels.sensing import SensingPanel
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.panels.timeline import TimelinePanel
@@ -97,7 +96,7 @@ def _left(gui: viser.GuiApi, send: Send) -> list[Any]:
 def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
     tabs = gui.add_tab_group()
     with tabs.add_tab("Result"):
-        result = [ResultPanel(gui), HappenedPanel(gui, send)]
+        result = ResultPanel(gui, send)
     with tabs.add_tab("Part"):
         part = PartPanel(gui, send)
     with tabs.add_tab("Located"):
@@ -108,4 +107,4 @@ def _right(gui: viser.GuiApi, send: Send) -> list[Any]:
         path = PathPanel(gui)
     with tabs.add_tab("Ledger"):
         ledger = LedgerPanel(gui, send)
-    return [*result, part, located, grasp, path, ledger]
+    return [result, part, located, grasp, path, ledger]

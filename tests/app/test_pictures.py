@@ -9,7 +9,7 @@ import pytest
 from handey_studio.app import html
 from handey_studio.app.cspace import nearest, slice_svg
 from handey_studio.app.palette import elevation_colours
-from handey_studio.app.panels.findings import result_html
+from handey_studio.app.panels.findings import result_html, timing_html
 from handey_studio.app.panels.grasp import grasp_facts
 from handey_studio.app.panels.ledger import context, entry_html, ledger_html
 from handey_studio.app.panels.sensing import counted, found_html, picked, word_of
@@ -74,7 +74,7 @@ def test_words_of_others_are_escaped_everywhere(session):
     shown = [
         ledger_html(state, ["b"]),
         entry_html(entries[0], entries),
-        result_html(result),
+        result_html(result) + timing_html(result),
         found_html(replace(session, scene=replace(scene, located=located))),
     ]
     shown += [html.card(evil, evil, testid=evil), html.facts([(evil, evil)]), html.empty(evil), html.swatch((0, 0, 0), evil)]

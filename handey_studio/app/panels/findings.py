@@ -5,28 +5,38 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.cspace import slice_html
+from handey_studio.app.exporting import ExportPlan
+from handey_studio.app.panels.running import HappenedPanel
 from handey_studio.app.state import State
-from handey_studio.app.wire import set_to
+from handey_studio.app.wire import Send, on_click, set_to
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.task.carrying import TOLD_M
 from handey_studio.task.plan import MovePlan, MoveResult
 
+EXPORTS = {"URScript": "urscript", "ROS 2": "ros2", "YAML": "ros2-yaml", "CSV": "csv"}
 NO_RESULT = "No MOVE was tried yet. Set the part and its destination on the left, then press Plan or MOVE."
 NO_PATH = "No path yet. A plan shows here what was proved of it, and the arm's way through the configuration space."
 NO_SPACE = "This plan kept no picture of its configuration space."
 
 
 class ResultPanel:
-    """The outcome, the time each stage took, the certificate."""
+    """The outcome, the certificate, what happened, the time each stage took, the plan for controllers."""
 
-    def __init__(self, gui: viser.GuiApi) -> None:
+    def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._pane = gui.add_html("")
+        self._happened = HappenedPanel(gui, send)
+        self._timing = gui.add_html("")
+        self._export = gui.add_button_group("Export", tuple(EXPORTS), visible=False, hint="Download the plan, after a dry check")
+        on_click(self._export, send, lambda event: ExportPlan(EXPORTS[event.target.value], event.client_id))
 
     def render(self, old: State | None, new: State) -> None:
+        self._happened.render(old, new)
         if old is not None and old.session.result is new.session.result and old.loads == new.loads:
             return
         result = new.session.result
         self._pane.content = result_html(result) if result else html.empty(NO_RESULT, "result-empty")
+        self._timing.content = timing_html(result) if result else ""
+        set_to(self._export, visible=new.attempt is not None)
 
 
 class PathPanel:
@@ -61,7 +71,7 @@ def clearance_legend() -> str:
 
 
 def result_html(result: MoveResult) -> str:
-    """Status, reason, poses, certificate, seconds."""
+    """Status, reason, poses, certificate."""
     tone = {"planned": "info", "done": "good", "failed": "bad"}[result.status]
     title = f"MOVE {result.command.part} TO {result.command.to}"
     said = {"planned": "Planned, not carried out yet.", "done": "Done."}.get(result.status, result.reason)
@@ -71,8 +81,13 @@ def result_html(result: MoveResult) -> str:
     if result.T_world_part_reached is not None and result.plan is not None:
         metres, radians = pose_difference(result.T_world_part_reached, result.plan.T_world_part_goal)
         pane += html.facts([("Reached within", f"{1e3 * metres:.2f} mm, {np.rad2deg(radians):.2f}°")])
+    return pane
+
+
+def timing_html(result: MoveResult) -> str:
+    """How long each stage took."""
     timing = [(stage, f"{seconds:.2f} s") for stage, seconds in result.timing_s.items()]
-    return pane + html.heading("Seconds a stage") + html.facts(timing, "timing")
+    return html.heading("Seconds a stage") + html.facts(timing, "timing")
 
 
 def plan_facts(plan: MovePlan) -> list[tuple[str, str]]:

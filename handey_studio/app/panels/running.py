@@ -6,11 +6,10 @@ import numpy as np
 import viser
 
 from handey_studio.app import html, palette
-from handey_studio.app.exporting import ExportPlan
 from handey_studio.app.happened import MOST_ROWS, Happening, LookAtHappening, happenings
 from handey_studio.app.palette import css
 from handey_studio.app.state import State
-from handey_studio.app.wire import Send, element_id, on_click, set_to
+from handey_studio.app.wire import Send, element_id, on_click
 from handey_studio.task.plan import MoveResult
 
 SIGNS = {
@@ -24,15 +23,10 @@ SIGNS = {
 SMOOTH = "Nothing went otherwise than planned."
 
 
-EXPORTS = {"URScript": "urscript", "ROS 2": "ros2", "ROS YAML": "ros2-yaml", "CSV": "csv"}
-
-
 class HappenedPanel:
-    """The rows of the result that is looked at, and its plan for robot controllers."""
+    """The rows of the result that is looked at."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
-        self._export = gui.add_button_group("Export", tuple(EXPORTS), visible=False, hint="Download the plan, after a dry check")
-        on_click(self._export, send, lambda event: ExportPlan(EXPORTS[event.target.value], event.client_id))
         self._list = gui.add_html("")
         self._rows = [gui.add_button(f"Happening in row {row + 1}") for row in range(MOST_ROWS)]  # pressed by the list, which hides them
         for row, button in enumerate(self._rows):
@@ -41,8 +35,6 @@ class HappenedPanel:
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
             return
-        result = new.session.result
-        set_to(self._export, visible=result is not None and result.plan is not None)
         self._list.content = happened_html(new, [element_id(button) for button in self._rows])
 
 
