@@ -78,9 +78,7 @@ class ModelPanel:
                 hint="PNG with its camera (JSON), NPY, PLY, PCD",
             )
             self._unit: Any = gui.add_dropdown("Clouds in", ("m", "cm", "mm"))
-        self._example = gui.add_button(
-            "Start from an example", icon=viser.Icon.SCHOOL, color="gray", hint="An object to model"
-        )
+        self._example = gui.add_button("Start from an example", icon=viser.Icon.SCHOOL, color="gray", hint="An object to model")
         self._open = gui.add_button("Continue the model", icon=viser.Icon.CUBE, color=palette.ARM_DARK, visible=False)
         self._close = gui.add_button("Back to MOVE", icon=viser.Icon.ROBOT, color="gray", visible=False)
         self._new = gui.add_button("New model", icon=viser.Icon.FILE_PLUS, color="gray", visible=False)
