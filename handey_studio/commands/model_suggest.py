@@ -1,6 +1,7 @@
 """`handey model suggest`: closed polyhedra for what stands in a depth image."""
 
 import argparse
+import math
 import sys
 import time
 from pathlib import Path
@@ -64,6 +65,8 @@ def _write(path: Path, solid: "Polyhedron") -> None:
 def _pixel(text: str) -> tuple[float, float]:
     try:
         u, v = (float(word) for word in text.split(","))
+        if not (math.isfinite(u) and math.isfinite(v)):
+            raise ValueError
     except ValueError:
         raise argparse.ArgumentTypeError(f'"{text}" is not U,V, a pixel as two numbers') from None
     return u, v

@@ -211,6 +211,10 @@ def _fan(corners: NDArray, polygon: list[int]) -> NDArray:
         raise BadInput(f"a face lists corners {polygon}; it needs at least 3 of the {len(corners)} corners.")
     if len(polygon) == 3:
         return np.array([polygon])
+    moved = (corners[polygon] != corners[np.roll(polygon, 1)]).any(axis=1)
+    polygon = [corner for corner, other in zip(polygon, moved, strict=True) if other]
+    if len(polygon) < 3:
+        raise BadInput("a face has no area; remove it or move its corners apart.")
     points = corners[polygon]
     area = _area_vector(points)
     length = np.linalg.norm(area)
@@ -219,7 +223,7 @@ def _fan(corners: NDArray, polygon: list[int]) -> NDArray:
     distances = (points - points.mean(axis=0)) @ (area / length)
     scale = np.linalg.norm(np.ptp(points, axis=0))
     if np.abs(distances).max() > 1e-3 * scale:
-        raise BadInput(f"a face is bent by {np.abs(distances).max() * 1e3:.3g} mm; a face must be planar within {scale:.3g} µm.")
+        raise BadInput(f"a face is bent by {np.abs(distances).max() * 1e3:.3g} mm; a face must be planar within {scale:.3g} mm.")
     local = Polyhedron(points, (Face(tuple(range(len(polygon)))),))
     if not local.face_polygon(0, local.face_frame(0)).is_valid:
         raise BadInput("a face's outline crosses itself; each face must be a simple polygon.")

@@ -9,12 +9,13 @@ from scipy.ndimage import binary_erosion, distance_transform_edt, find_objects
 from handey_studio.geometry.transforms import apply
 from handey_studio.modeling.patches import Border, Crease, Patch, Patches
 from handey_studio.modeling.patches_bodies import bodies_of, creases_of
-from handey_studio.modeling.patches_growing import Camera, grown, normals_of, planes_of
+from handey_studio.modeling.patches_growing import grown, normals_of, planes_of
 from handey_studio.modeling.patches_outlines import area_of, outlines_of
 from handey_studio.modeling.patches_sides import SUPPORT, Seen, lost_at_rims
 from handey_studio.modeling.patches_windows import Field, field_of
 from handey_studio.modeling.scans import Scan
-from handey_studio.sensing.depth_view import DepthView, Pinhole
+from handey_studio.sensing.depth_view import DepthView
+from handey_studio.sensing.drawing import Camera, camera_of
 from handey_studio.sensing.facets import sigma_at
 
 ON_SUPPORT_SIGMAS = 4.5
@@ -39,7 +40,7 @@ def patches_of(scan: Scan, options: PatchOptions = PatchOptions()) -> Patches:
     height = points[..., 2]
     with np.errstate(invalid="ignore"):
         above, support = height > ON_SUPPORT_SIGMAS * sigma, np.abs(height) <= ON_SUPPORT_SIGMAS * sigma
-    camera = camera_of(view)
+    camera = camera_of(view.projection)
     field = field_of(view, above)
     labels, _ = grown(field, camera)
     labels = _without_slivers(labels, options)
@@ -63,11 +64,6 @@ def patch_at(patches: Patches, u: float, v: float, reach_px: int = 4) -> Patch |
     nearest = int(np.argmin((rows + top - v) ** 2 + (columns + left - u) ** 2))
     number = int(near[rows[nearest], columns[nearest]])
     return patches.patches[number]
-
-
-def camera_of(view: DepthView) -> Camera:
-    p = view.projection
-    return (0.0, p.fx, p.fy, p.cx, p.cy) if isinstance(p, Pinhole) else (1.0, 1.0 / p.pixel, 1.0 / p.pixel, p.cx, p.cy)
 
 
 def _sigma(view: DepthView) -> NDArray:

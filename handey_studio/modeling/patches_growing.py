@@ -5,6 +5,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.modeling.patches_windows import Field
+from handey_studio.sensing.drawing import Camera
 
 ON_SIGMAS = 3.5  # a reading so near lies on the plane
 BULGE_SIGMAS = 1.0  # cartons bulge, sensors warp: so much more, along the plane's normal
@@ -16,8 +17,6 @@ REACH_PX = 2  # over single lost readings
 LEAST_READINGS = 30
 SAME_RAD, SAME_RMS = np.deg2rad(8.0), 1.15  # two regions are one plane if their normals agree and the rms hardly grows
 SMALL_SHARE, SMALL_SIGMAS = 0.12, 2.5  # a region with so few of its neighbour's readings, so near to its plane, is its rounded edge
-
-Camera = tuple[float, float, float, float, float]  # 1 if parallel, pixels a metre at depth 1 along x and y (or anywhere), cx, cy
 
 
 def grown(field: Field, camera: Camera) -> tuple[NDArray, NDArray]:

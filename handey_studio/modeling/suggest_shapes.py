@@ -21,7 +21,6 @@ NEAR_END_M = 0.02
 LEAST_THICK_M = 0.002
 LEAST_SLOPE = 0.1  # sine of the angle between planes whose meeting is a side
 SEEN_WORTH = 3.0  # a face that is seen tells three times as much as a rim of that length
-SHORT_SIGMAS, SHORT_PX_M = 3.0, 0.004  # shorter sides of an outline are the sensor's
 INTO_M = 0.001  # columns reach into higher ones beside them
 NEAR_STEP_M = 0.006  # so near to where a higher face hides the lower one its side goes down
 MOST_ENDS = 3

@@ -30,8 +30,8 @@ def check_part_name(name: str) -> str:
 def write_part(library: Library, part: Part, draft: bytes | None = None, overwrite: bool = False) -> Part:
     """Keep a part in the user's own `parts/`, with its draft (bytes of a `.draft` file) if there is one; the part as reading gives it.
 
-    Nobody ever finds it half written. Raises BadInput with one
-    sentence when its shape is no solid, its name cannot be used, or a part of that name is there and `overwrite` is off.
+    Nobody ever finds it half written. Raises BadInput with one sentence when its shape is no solid, its name cannot be used, or a part of
+    that name is there and `overwrite` is off.
     """
     folder, name = library.folder / "parts", check_part_name(part.name)
     _check_free(library, folder, name, overwrite)

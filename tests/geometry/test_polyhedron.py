@@ -105,3 +105,18 @@ def test_an_inside_out_solid_is_turned_right():
     vertices, polygons = _cube()
     solid = polyhedron_from_polygons(vertices, [polygon[::-1] for polygon in polygons])
     assert solid.volume_and_centroid[0] > 0
+
+
+@pytest.mark.parametrize("first", [0, 1, 2, 3])
+def test_a_corner_that_is_listed_twice_is_one_corner(first):
+    cube = box((1.0, 1.0, 1.0))
+    loops = [list(face.outer) for face in cube.faces]
+    corners = np.vstack([cube.vertices, cube.vertices[loops[0][first]]])
+    loops[0].insert(first, 8)  # a side without length, also as the first one
+    assert polyhedron_from_polygons(corners, loops).volume_and_centroid[0] == pytest.approx(1.0)
+
+
+def test_a_face_whose_corners_coincide_is_refused_in_a_sentence():
+    corners = np.vstack([np.eye(3), np.eye(3)[:1]])
+    with pytest.raises(BadInput, match="no area"):
+        polyhedron_from_polygons(corners, [[0, 3, 1, 1]])

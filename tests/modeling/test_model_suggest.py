@@ -60,3 +60,10 @@ def test_nothing_there_is_status_3(suggest):
 def test_bad_input_is_one_sentence(suggest, more, told):
     status, _, said = suggest([(SIZE, box_pose(SIZE))], *more)
     assert status == 2 and told in said and len(said.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("at", ["nan,1", "inf,0"])
+def test_a_pixel_that_is_no_number_is_refused_in_a_sentence(tmp_path, capsys, at):
+    given = ["model", "suggest", "--depth", "none.png", "--json", str(tmp_path / "out.json"), f"--at={at}"]
+    assert cli.main(given) == 2
+    assert f'"{at}" is not U,V' in capsys.readouterr().err
