@@ -1,6 +1,7 @@
 """The house stays as it is laid out: imports run one way, only the workbench imports viser, files and functions stay short."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import handey_studio
@@ -23,9 +24,9 @@ FLOORS = (
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
 
 
+@cache
 def _modules():
-    for path in sorted(ROOT.rglob("*.py")):
-        yield path, ast.parse(path.read_text())
+    return [(path, ast.parse(path.read_text())) for path in sorted(ROOT.rglob("*.py"))]
 
 
 def _imports(tree: ast.Module):

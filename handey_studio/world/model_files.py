@@ -60,6 +60,8 @@ def read_mesh(path: Path) -> Mesh:
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise BadInput(f'part model "{path}" has the suffix "{path.suffix}"; it must be one of {", ".join(MESH_SUFFIXES)}.')
     try:
+        if path.is_dir():
+            raise BadInput(f'part model "{path}" is a folder; give a file in it.')
         if path.stat().st_size > MAX_MODEL_BYTES:
             raise BadInput(f'part model "{path}" has {path.stat().st_size} bytes, the limit is {MAX_MODEL_BYTES}.')
         return _read_obj(path) if path.suffix.lower() == ".obj" else _read_mesh(path)
