@@ -3,6 +3,7 @@
 from handey_studio.app.jobs import CANCELLED
 from handey_studio.app.state import Job, State
 from handey_studio.session.run import PLANNED, SENSED
+from handey_studio.task.move import UNSURE
 
 STAGES = (("Sense", 0.0), ("Plan", SENSED), ("Execute", PLANNED))
 
@@ -39,10 +40,19 @@ def next_step(state: State) -> tuple[str, str, str]:
     if result.status == "failed":
         if result.performances:
             return "It was not done", f"{_sentence(result.reason)} What happened is told on the right, under Result.", "bad"
-        return "No plan was found", f"{_sentence(result.reason)} The ledger tells what was tried; another destination may do.", "bad"
+        return "No plan was found", f"{_sentence(result.reason)} {_way_out(result.reason)}", "bad"
     if result.status == "planned":
         return "Planned: look before it moves", "Play or scrub the timeline. MOVE carries it out.", "good"
     return "Done", "The part was moved. Choose where it goes next, or save the session.", "good"
+
+
+def _way_out(reason: str) -> str:
+    """What may help where there is no plan."""
+    if reason.startswith(UNSURE):
+        return "No destination helps: this view does not tell how it stands. Turn it over, or onto another side, and scan again."
+    if "was not found in the scan" in reason:
+        return "Clear what hides it, or turn it; Located tells what was nearly taken for it."
+    return "The ledger tells what was tried; another destination may do."
 
 
 def _sentence(reason: str) -> str:

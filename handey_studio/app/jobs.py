@@ -11,6 +11,7 @@ from handey_studio.session.sequence import states_of
 from handey_studio.task.plan import MoveResult
 
 KINDS = {"planned": "planned", "done": "good", "failed": "bad"}  # of notices
+FIRST_JOB = "Starting the planner; the first time on a machine it compiles for a minute or more, whatever it says that it is at."
 CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
 
 
@@ -86,6 +87,7 @@ class JobStarted:
 
     def apply(self, state: State) -> State:
         job = Job(state.jobs + 1, self.execute, title=self.title, done=self.done)
+        job = replace(job, message=FIRST_JOB) if job.number == 1 else job
         return replace(state, jobs=state.jobs + 1, playing=False, job=job)
 
 

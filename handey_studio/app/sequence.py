@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from handey_studio.app.actions import Bench
-from handey_studio.app.jobs import JobStarted, at_the_end, merged, outcome
+from handey_studio.app.jobs import CANCELLED, JobStarted, at_the_end, merged, outcome
 from handey_studio.app.state import State, with_view
 from handey_studio.base import BadInput
 from handey_studio.session import Session
 from handey_studio.session.command_list import with_commands
 from handey_studio.session.destination import anywhere
-from handey_studio.session.sequence import from_the_start, next_command, run_list, skipped, states_of
+from handey_studio.session.sequence import from_the_start, last_run, next_command, run_list, skipped, states_of
 from handey_studio.task.plan import MoveCommand
 from handey_studio.world import Library
 
@@ -122,12 +122,10 @@ def run_next(session: Session, library: Library, execute: bool, progress: Any) -
 
 
 def commands_done(state: State, found: Session) -> State:
-    """The state when a run has ended; the last command that was run plays."""
-    grown = len(found.results) > len(state.session.results)
-    cancelled = state.job is not None and state.job.cancelling
+    """The state when a run has ended: the command that was run last is chosen, and its end looked at."""
     state = replace(state, session=merged(state.session, found))
-    states = states_of(state.session)
-    state = at_the_end(replace(state, chosen=min(next_command(state.session) or 0, len(states) - 1))) if grown or cancelled else state
+    states, cancelled = states_of(state.session), bool(found.results) and found.results[-1].reason == CANCELLED
+    state = at_the_end(replace(state, chosen=last_run(state.session)))
     over = sum(one.status in ("done", "skipped") for one in states)
     if over == len(states):
         return state.told(f"All {len(states)} commands are done.", "good")

@@ -15,6 +15,7 @@ from handey_studio.localization.explain import Explanation
 from handey_studio.session import Moment, Replay, Session, Told, attempts_of, replay_of
 from handey_studio.session.handling import Handling
 from handey_studio.session.ledger_tree import ROOT
+from handey_studio.session.sequence import last_run
 from handey_studio.task.calibrate import RangeCalibration
 from handey_studio.task.performance import Performance
 from handey_studio.task.plan import Carry, MoveCommand, MovePlan
@@ -40,7 +41,7 @@ class Job:
     number: int
     execute: bool
     fraction: float = 0.0
-    message: str = "Starting the planner; the first time on a machine it compiles for half a minute."
+    message: str = "Starting the planner."
     cancelling: bool = False
     title: str = ""
     done: "Callable[[State, Any], State] | None" = None
@@ -228,7 +229,7 @@ class State:
 def opened(library: Library, session: Session, path: Path | None, before: State | None = None) -> State:
     """The state in which a session was just opened. Raises BadInput when its robot is unknown."""
     robot = library.robot(session.workcell.robot)
-    state = State(library, session, robot, saved=session if path else None, path=path)
+    state = State(library, session, robot, saved=session if path else None, path=path, chosen=last_run(session))
     if before is None:
         return state
     here = {"viewers": before.viewers, "speed": before.speed, "left_behind": before.left_behind}

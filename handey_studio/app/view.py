@@ -1,5 +1,6 @@
 """Everything on screen, made once; `render` then draws the difference between two states."""
 
+import logging
 from typing import Any, Protocol
 
 import viser
@@ -40,6 +41,8 @@ from handey_studio.app.shortcuts import add_shortcuts
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send
 
+log = logging.getLogger(__name__)
+
 LEFT_WIDTH, RIGHT_WIDTH = 318, 348
 
 
@@ -68,12 +71,18 @@ class View:
         server.gui.main_panel.set_width(RIGHT_WIDTH)
         add_shortcuts(server.gui, send, session)
 
-    def render(self, old: State | None, new: State) -> None:
+    def render(self, old: State | None, new: State) -> tuple[str, ...]:
+        """Draw what differs. A pane that breaks down is left as it is, logged, and its name returned: the others are drawn all the same."""
+        of_move = (None if old is None else aside(old), aside(new))
+        broken = []
         with self._server.atomic():
-            for pane in self._of_move:
-                pane.render(None if old is None else aside(old), aside(new))
-            for pane in self._panes:
-                pane.render(old, new)
+            for pane, states in [*((pane, of_move) for pane in self._of_move), *((pane, (old, new)) for pane in self._panes)]:
+                try:
+                    pane.render(*states)
+                except Exception:
+                    log.exception("%s could not be drawn", type(pane).__name__)
+                    broken.append(type(pane).__name__)
+        return tuple(broken)
 
 
 def _left(gui: viser.GuiApi, send: Send) -> list[Any]:

@@ -35,6 +35,7 @@ log = logging.getLogger(__name__)
 FRAME_S = 1.0 / 30.0
 IDLE_S = 0.25
 NOTICE_S = 7.0
+RELOAD = "Save the session and start the program anew if it stays so; its log tells more."
 FIELD_OF_VIEW_RAD = float(np.deg2rad(40.0))
 NOTICE_LOOKS = {
     "info": ("Handey Studio", BLUE),
@@ -133,7 +134,9 @@ class Workbench:
         old = self.state
         for command in commands:
             self.state = self._next(command)
-        self._view.render(old, self.state)
+        broken = self._view.render(old, self.state)
+        if broken:
+            self.state = self.state.told(f"{', '.join(broken)} could not be drawn; nothing is lost. {RELOAD}", "bad")
         self._turn(old)
         self._follow()
         self._notify(old)
@@ -143,6 +146,9 @@ class Workbench:
             return command.run(self) if hasattr(command, "run") else command.apply(self.state)
         except BadInput as error:
             return self.state.told(str(error), "bad")
+        except Exception:
+            log.exception("%s broke down", type(command).__name__)
+            return self.state.told(f"{type(command).__name__} broke down and changed nothing. {RELOAD}", "bad")
 
     def _turn(self, old: State) -> None:
         """When the model is opened or closed, its tab or that of the MOVE comes to the front, and the cameras go there or back."""

@@ -5,8 +5,6 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from handey_studio.base import BadInput, measured
 from handey_studio.commands.arguments import DONE, FAILED, NOTHING_FOUND, check_output, check_suffix, write_json
 
@@ -55,12 +53,13 @@ def run(given: argparse.Namespace) -> int:
 
 
 def _summary(name: str, built: "Built") -> str:
+    from handey_studio.modeling.suggest_report import aligned_box
+
     fallen = sum(step.reason is not None for step in built.steps)
     steps = f"{len(built.steps)} steps, {fallen} not done" if fallen else f"{len(built.steps)} steps, all done"
     if built.solid is None:
         return f"{name}: {steps}; no solid."
-    sides = np.ptp(built.solid.vertices, axis=0)
-    size = " × ".join(measured(float(side), "m").removesuffix(" mm") for side in sides)
+    size = " × ".join(measured(float(side), "m").removesuffix(" mm") for side in aligned_box(built.solid))
     volume = built.solid.volume_and_centroid[0] * 1e6
     return f"{name}: {steps}; {len(built.solid.faces)} faces, {size} mm, {volume:.4g} cm³."
 

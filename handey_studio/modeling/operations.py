@@ -76,7 +76,7 @@ class AlignScan(Operation):
 
     @property
     def told(self) -> str:
-        return f"{self.kind} {self.scan} within {measured(self.rms, 'm')}"
+        return f"align {self.scan} within {measured(self.rms, 'm')}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,12 @@ def next_command(session: Session) -> int | None:
     return next((number for number, state in enumerate(states_of(session)) if state.status not in OVER), None)
 
 
+def last_run(session: Session) -> int:
+    """The number of the command that the session's last result belongs to, -1 if it belongs to none of the list."""
+    last = len(session.results) - 1
+    return next((number for number, state in enumerate(states_of(session)) if state.result == last >= 0), -1)
+
+
 def skipped(session: Session, number: int) -> Session:
     """The session in which a command is passed over."""
     return _with_state(session, number, CommandState("skipped"))

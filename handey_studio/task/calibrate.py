@@ -206,7 +206,8 @@ class _Showman:
     def _show(self, T_world_hand: NDArray, progress: Progress) -> int | None:
         """Go there, scan, look for the face; the showing's number if it was seen. Every failure is in the ledger."""
         number = len(self.showings)
-        progress.report(min(0.99, len(self._seen) / self.options.poses), f"showing the cube at pose {number + 1}")
+        seen, wanted = len(self._seen), self.options.poses
+        progress.report(min(0.99, seen / wanted), f"{seen} of {wanted} poses seen; showing the cube at place {number + 1}")
         x, y, z = 1e3 * T_world_hand[:3, 3]
         entry = self.ledger.add(STAGE, f"the hand at {x:.0f}, {y:.0f}, {z:.0f} mm")
         path = plan_reach(self.world, self.cell.joints(), T_world_hand, self.opening, self.held)

@@ -19,6 +19,7 @@ from handey_studio.task.search import OptionSearch, SearchOptions, settle
 from handey_studio.world import Part, PlacedPart, World
 
 SETTLED_M = 0.02  # nearer than this to where it was put it is the same part, whatever the naming of its symmetries
+UNSURE = "it could nearly as well stand otherwise, or be another part"
 
 
 @dataclass(frozen=True)
@@ -104,8 +105,7 @@ def _goals(
     found = []
     for placed in _candidates(world, command.part):
         if doubts.get(placed.name, 0.0) > options.most_doubt:
-            ledger.add("destination", placed.name, "it could nearly as well stand otherwise, or be another part", limit=options.most_doubt,
-                       value=doubts[placed.name])  # fmt: skip
+            ledger.add("destination", placed.name, UNSURE, value=doubts[placed.name], limit=options.most_doubt)
             continue
         if placed.name != command.part and _is_settled(placed, options):
             ledger.add("destination", placed.name, "an earlier command put it there")

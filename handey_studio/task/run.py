@@ -46,6 +46,8 @@ def run_move(
             scene = scene if scene is not None and look == 0 else sense(station, cell, options.seed + look, Share(progress, 0.0, SENSED))
         except CannotAct as error:
             return Outcome(replace(result, reason=str(error)), None)
+        if progress.cancelled:
+            return Outcome(replace(result, reason="cancelled"), None)
         result = plan_in(station, scene, command, cell.joints(), cell.opening(), options, Share(progress, SENSED, PLANNED))
         if result.plan is not None or progress.cancelled:
             break

@@ -15,6 +15,7 @@ from handey_studio.modeling.draft_files import draft_to_bytes, read_draft
 from handey_studio.modeling.operations import TakeSuggestion
 from handey_studio.session import Session
 from handey_studio.session.modelling import find_parts, part_of, provenance_of, with_part
+from handey_studio.task.move import MoveOptions
 from handey_studio.task.plan import MoveCommand
 from handey_studio.world import Part
 from handey_studio.world.library import bundled
@@ -144,7 +145,11 @@ def found(state: State, session: Session) -> State:
     if not count:
         reason = shown.scene.located.reason if shown.scene is not None else ""
         return state.told(f'"{name}" was not found in the cell. {reason} Located, on the right, tells what was weighed.', "bad")
-    return state.told(f'"{name}" was found{f" {count} times" if count > 1 else ""}. Press Plan or MOVE.', "good")
+    many = f" {count} times" if count > 1 else ""
+    doubts = shown.scene.doubts if shown.scene is not None else {}
+    if all(doubts.get(placed.name, 0.0) > MoveOptions().most_doubt for placed in shown.located if placed.part.name == name):
+        return state.told(f'"{name}" was found{many}, but this view does not tell how it stands: turn it over and find it again.', "bad")
+    return state.told(f'"{name}" was found{many}. Press Plan or MOVE.', "good")
 
 
 def _looking_for(bench: Any, state: State, part: Part) -> State:

@@ -32,9 +32,8 @@ def numbers_html(state: State) -> str:
     rows.append(("Faces", f"{len(shown.solid.faces)}, {assumed} of them assumed" if assumed else f"{len(shown.solid.faces)}, none assumed"))
     rows += truth_facts(judged)
     if counted is not None:
-        words = (
-            f"{counted[0]} grasp classes, {counted[1]} approach groups" if counted[0] else "nothing: no two faces fit between its fingers"
-        )
+        words = f"{counted[0]} grasp class{'es'[: 2 * (counted[0] != 1)]}, {counted[1]} approach group{'s'[: counted[1] != 1]}"
+        words = words if counted[0] else "nothing: no two faces fit between its fingers"
         rows.append(("The hand can grasp", words))
     return html.facts(rows, "part-numbers")
 
