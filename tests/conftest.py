@@ -15,6 +15,7 @@ settings.load_profile("same")
 BROWSER = Path(__file__).parent / "browser"
 
 
+@pytest.hookimpl(tryfirst=True)  # before the groups are read
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The browser's tests come first, as they take longest."""
     items.sort(key=lambda item: BROWSER not in item.path.parents)
