@@ -151,7 +151,7 @@ def test_the_shell_replays_a_draft(tmp_path, capsys):
         "1. box down to the table",
         "2. sketch step with 4 sides",
         "3. extrude step by 30 mm",
-        "box: 3 steps, all done; 8 faces, 100 × 60 × 70 mm, 330 cm³.",
+        "box: 3 steps, all done; 8 faces, 60 × 70 × 100 mm, 330 cm³.",
     ]
     assert np.isclose(read_polyhedron(obj).volume_and_centroid[0], 330e-6)
     report = json.loads(out.read_text())
