@@ -8,15 +8,14 @@ import pytest
 
 from handey_studio import cli
 
-README = (Path(__file__).parents[1] / "README.md").read_text()
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+MODELLING = (ROOT / "handey_studio/guide/modelling.md").read_text()
 
 
-def section(title: str) -> str:
-    return README.split(f"## {title}\n")[1].split("\n## ")[0]
-
-
-def code(title: str) -> list[str]:
-    return [line[4:] for line in section(title).splitlines() if line.startswith("    ") or not line.strip()]
+def code(title: str, text: str = README) -> list[str]:
+    section = text.split(f"## {title}\n")[1].split("\n## ")[0]
+    return [line[4:] for line in section.splitlines() if line.startswith("    ") or not line.strip()]
 
 
 def shell_lines() -> list[str]:
@@ -42,5 +41,20 @@ def test_the_python_example_moves_the_block(capsys):
 
 
 def test_the_modelling_example_builds_a_carton(capsys):
-    exec(compile("\n".join(code("Modelling: a part is its history")), "README.md", "exec"), {})
+    exec(compile("\n".join(code("A part is its history", MODELLING)), "modelling.md", "exec"), {})
     assert capsys.readouterr().out.startswith("(0.00139"), "180 × 119.5 × 65 mm"
+
+
+def test_readme_links_to_every_page_of_the_guide_and_to_nothing_that_is_not_there():
+    linked = set(re.findall(r"\]\((\S+?)\)", README))
+    assert all((ROOT / link).is_file() for link in linked)
+    assert {str(page.relative_to(ROOT)) for page in (ROOT / "handey_studio/guide").glob("*.md")} <= linked
+
+
+def test_a_page_of_the_guide_is_shown_by_the_beginning_of_its_name(capsys):
+    assert cli.main(["guide", "model"]) == 0
+    assert capsys.readouterr().out == MODELLING
+    assert cli.main(["guide"]) == 0
+    assert "parts_and_robots" in capsys.readouterr().out
+    assert cli.main(["guide", "cooking"]) == 2
+    assert "workbench" in capsys.readouterr().err

@@ -12,6 +12,7 @@ from handey_studio.commands import (
     calibrate,
     export,
     fit_score,
+    guide,
     locate,
     model_replay,
     model_suggest,
@@ -53,6 +54,7 @@ COMMANDS = (
     part_show,
     robot_check,
     robot_list,
+    guide,
 )
 
 __all__ = ["COMMANDS"]

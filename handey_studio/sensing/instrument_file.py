@@ -1,4 +1,4 @@
-"""The range finder's parameters in a file: JSON, schema `handey/range-finder/1`. README tells each key."""
+"""The range finder's parameters in a file: JSON, schema `handey/range-finder/1`. The guide's page on scanning tells each key."""
 
 import json
 from pathlib import Path
