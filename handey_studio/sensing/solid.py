@@ -2,7 +2,8 @@
 
 Below a reading everything is solid. A hole, where nothing was read, is solid up to the lowest light that passed over it on its
 way to a reading elsewhere (the shadow's own slope), and never above the hole's rim. Readings that a located part explains leave
-the map with it, and only those; what it stood on stays solid up to the part's underside. With them goes the sliver of its own shadow
+the map with it, and only those; what it stood on stays solid up to the part's underside. A lone reading that stands out of level ground
+no farther than readings err is the ground's own: two that agree are a thing. With them goes the sliver of its own shadow
 that is no wider than fingers need to close on it: they close by force and tell their width, so they feel what nobody saw there.
 """
 
@@ -22,13 +23,14 @@ from handey_studio.world import Part, PlacedPart
 
 EXPLAINED_SIGMAS = 4.0  # a reading this many standard deviations from a part's surface is still the part's
 SLIVER_M = 0.006  # between a part's face and an open finger
+AROUND = 2  # cells to each side that must be level around a lone reading
 
 
 def solid_columns(depth_map: DepthMap) -> HeightField:
     """The columns that are solid before any part is explained."""
-    hole = np.isnan(depth_map.elevation)
+    elevation = _without_lone_readings(depth_map)
     unread = np.where(depth_map.passed < SKY_M, depth_map.passed, np.inf)
-    top = np.where(hole, np.minimum(_rim(depth_map.elevation), unread), depth_map.elevation)
+    top = np.where(np.isnan(elevation), np.minimum(_rim(elevation), unread), elevation)
     return HeightField(top, depth_map.cell, depth_map.T_world_range)
 
 
@@ -44,6 +46,36 @@ def without_parts(depth_map: DepthMap, columns: HeightField, placed: tuple[Place
 def explained_tolerance(depth_map: DepthMap) -> float:
     """How far [m] from a part's surface a reading may lie and still be the part's: noise and outline error together."""
     return EXPLAINED_SIGMAS * depth_map.noise + depth_map.outline_error
+
+
+def _without_lone_readings(depth_map: DepthMap) -> NDArray:
+    """The elevations (ny, nx) [m] with each lone reading as low as the highest cell beside it: the 24 around it were read and are level,
+    and it stands out of them farther than noise explains, but no farther than a surface's readings err."""
+    elevation, likely = np.array(depth_map.elevation), EXPLAINED_SIGMAS * depth_map.noise
+    _lower_lone(depth_map.elevation, elevation, likely, likely + explained_tolerance(depth_map))
+    return elevation
+
+
+@njit(cache=True)
+def _lower_lone(read: NDArray, lowered: NDArray, likely: float, most: float) -> None:
+    """Lower the lone readings among `read` (ny, nx): more than `likely` [m] and at most `most` above the middle of those around them, which
+    are within `likely` of it themselves."""
+    for j in range(AROUND, read.shape[0] - AROUND):
+        for i in range(AROUND, read.shape[1] - AROUND):
+            around = read[j - AROUND : j + AROUND + 1, i - AROUND : i + AROUND + 1]
+            if not read[j, i] - read[j, i - 1] > 0.0 or not read[j, i] - read[j, i + 1] > 0.0:
+                continue
+            middle = (around.sum() - read[j, i]) / (around.size - 1)
+            if not (likely < read[j, i] - middle <= most):
+                continue
+            level, beside = True, -np.inf
+            for a in range(around.shape[0]):
+                for b in range(around.shape[1]):
+                    if a != AROUND or b != AROUND:
+                        level = level and abs(around[a, b] - middle) <= likely
+                        beside = max(beside, around[a, b]) if max(abs(a - AROUND), abs(b - AROUND)) == 1 else beside
+            if level:
+                lowered[j, i] = beside
 
 
 def _rim(elevation: NDArray) -> NDArray:

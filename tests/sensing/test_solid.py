@@ -86,3 +86,25 @@ def test_what_a_tilted_part_stands_on_stays_solid_up_to_its_underside():
     centre = columns[50, 50]
     assert lowest - 1e-6 <= centre <= 0.05, (lowest, centre)
     assert dm.view().depth.shape == (N, N)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from([0.0, 0.04]))
+def test_a_lone_reading_on_level_ground_is_noise_and_two_are_a_thing(seed, ground):
+    rng = np.random.default_rng(seed)
+    elevation = np.full((N, N), 0.0)
+    elevation[20:80, 20:80] = ground
+    elevation += rng.normal(0.0, 1e-4, elevation.shape)
+    spot = tuple(rng.integers(24, 76, 2))
+    spiked = elevation.copy()
+    spiked[spot] = ground + rng.uniform(0.0015, 0.002)
+    assert solid_columns(depth_map(spiked)).top[spot] < ground + 0.0006
+    away = [(a, b) for a in (-2, -1, 0, 1, 2) for b in (-2, -1, 0, 1, 2) if (a, b) != (0, 0)]
+    da, db = away[rng.integers(len(away))]
+    other = spot[0] + da, spot[1] + db
+    for second in (spiked[spot], np.nan):
+        pair = spiked.copy()
+        pair[other] = second
+        assert solid_columns(depth_map(pair)).top[spot] == pair[spot], "two that agree, or one beside a hole, are taken for solid"
+    spiked[spot] = ground + 0.01
+    assert solid_columns(depth_map(spiked)).top[spot] == spiked[spot], "a needle that stands upright is no noise"
