@@ -34,8 +34,9 @@ class PhysicalCell(ControlledCell, TrueState):
     def held_truly(self) -> str | None:
         return self._simulated.held()
 
-    def touched_truly(self) -> set[tuple[str, str]]:
-        """What of the robot (`link3`, `hand`, `finger_left` …) has touched which body so far, for benchmarks and checkers only."""
+    def touched_truly(self) -> dict[tuple[str, str], float]:
+        """What of the robot (`link3`, `hand`, `finger_left` …), or which body in its hand, has touched which body so far, and how hard at
+        most [N]; for benchmarks and checkers only. What the held body stood against at the start is left out."""
         return self._simulated.touched()
 
     def _sweep(self) -> DepthMap:

@@ -10,6 +10,7 @@ from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.driver import Drive, Reference
 from handey_studio.cell.physics import CONTACT_TIME_S, STEP_S, add_bodies, mujoco, new_spec, pose_of
 from handey_studio.cell.robot_model import add_robot
+from handey_studio.cell.touches import Touches, normal_forces
 from handey_studio.geometry.transforms import to_wxyz
 from handey_studio.world.arm import Arm
 from handey_studio.world.robot import FINGERS
@@ -41,8 +42,7 @@ class Simulation:
         self._hand_bodies = np.array([self.model.body(name).id for name in ("hand", *FINGERS)])
         self._is_pad = np.isin(np.arange(self.model.nbody), self._hand_bodies[1:])
         self._base = self.model.body("link0").id
-        self._is_robot = np.arange(self.model.nbody) >= self._base
-        self._met: set[tuple[int, ...]] = set()
+        self._touches = Touches(np.arange(self.model.nbody) >= self._base, self._hand_bodies[1:].tolist())
         limits = np.array(arm.model.effortLimit, dtype=float)
         self._effort = np.where((limits > 0) & np.isfinite(limits), limits, np.inf)
         self._finger_gain = FINGER_RATE**2 * float(self.model.dof_armature[self.finger_dofs[0]])
@@ -63,6 +63,7 @@ class Simulation:
         self.data.qvel[:] = 0.0
         self._integral, self.finger_force = -grip_N, grip_N
         mujoco.mj_forward(self.model, self.data)
+        self._touches.stands(self.model.geom_bodyid[self.data.contact.geom])
 
     def step(self, to: Reference, fingers: Drive) -> None:
         """One time step: torques that bring the error of each joint down at the controller's rate, on the arm's own inertia.
@@ -72,7 +73,6 @@ class Simulation:
         model, data = self.model, self.data
         mujoco.mj_step1(model, data)
         owners = model.geom_bodyid[data.contact.geom]
-        self._met.update(map(tuple, owners[self._is_robot[owners].any(axis=1)].tolist()))
         self._turn_with_hand(owners)
         dofs = self.arm_dofs
         error = to.q - to.velocity * self.dt - data.qpos[self._q_at]
@@ -83,6 +83,7 @@ class Simulation:
         data.qfrc_applied[dofs] = np.clip(torque, -self._effort, self._effort)
         data.qfrc_applied[self.finger_dofs] = self._finger_push(fingers) + data.qfrc_bias[self.finger_dofs]
         mujoco.mj_step2(model, data)
+        self._touches.feel(owners, normal_forces(data.efc_force, data.contact.efc_address))
 
     def _turn_with_hand(self, owners: NDArray) -> None:
         """Tell the grip's contacts, between bodies `owners` (n, 2), how pad and body would accelerate apart if no joint's rate changed.
@@ -173,12 +174,13 @@ class Simulation:
         both = {name: min(forces.values()) for name, forces in pressed.items() if len(forces) == 2 and min(forces.values()) > 0}
         return max(both, key=both.__getitem__, default=None)
 
-    def touched(self) -> set[tuple[str, str]]:
-        """Which of the robot's parts (`link3`, `hand`, `finger_left` …) has touched which body since the start, as pairs of names."""
-        names = {self.model.body(f"body{k}").id: body.name for k, body in enumerate(self.bodies)}
+    def touched(self) -> dict[tuple[str, str], float]:
+        """What of the robot (`link3`, `hand`, `finger_left` …), or which body that it held, has touched which body so far, and how hard at
+        most [N]. What a held body stood against before anything moved is left out."""
+        names = {number: self.model.body(number).name for number in range(self.model.nbody)}
+        names |= {self.model.body(f"body{k}").id: body.name for k, body in enumerate(self.bodies)}
         names |= {self.model.body(f"ghost{k}").id: body.name for k, body in enumerate(self._ghosts)}
-        pairs = (sorted(pair, key=names.__contains__) for pair in self._met)
-        return {(self.model.body(robot).name, names[other]) for robot, other in pairs}
+        return {(names[a], names[b]): force for (a, b), force in self._touches.most.items()}
 
     def rub(self, name: str, share: float) -> None:
         """The friction between the fingers and a body becomes a share of its own."""

@@ -17,27 +17,29 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
     bench.add_argument("--kit", action="store_true", help="sequences instead: a pile of ten parts sorted into a tray")
     bench.add_argument("--attempts", type=positive, default=3, help="how often a MOVE is tried (default: 3)")
     bench.add_argument("--robot", default="ur5", help="a robot of the library (default: ur5)")
+    bench.add_argument("--jobs", type=positive, default=1, help="so many processes share the seeds (default: 1)")
     bench.add_argument("--json", type=Path, help="write the table here")
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.task.bench_act import bench_act, bench_act_faults
-    from handey_studio.task.bench_faults import FAULTS
+    from handey_studio.session.bench_kit import bench_kit
+    from handey_studio.task.bench_act import Trial, bench_act, bench_act_faults
 
     check_output(given.json)
-    library, wanted = Library.choose(given.library), given.seeds or range(10)
-    if given.kit:
-        from handey_studio.session.bench_kit import bench_kit
-
-        report = bench_kit(wanted, library, print, given.robot, given.attempts)
-    elif given.faults:
-        kinds = FAULTS if given.faults == "all" else tuple(given.faults.split(","))
-        unknown = sorted(set(kinds) - set(FAULTS))
-        if unknown:
-            raise BadInput(f'fault "{unknown[0]}" is not known; choose among: {", ".join(FAULTS)}.')
-        report = bench_act_faults(wanted, library, print, kinds, given.robot, given.attempts)
-    else:
-        report = bench_act(wanted, library, print, given.robot, given.attempts)
+    trial = Trial(Library.choose(given.library), given.robot, given.attempts, kinds(given.faults))
+    bench = bench_kit if given.kit else bench_act_faults if given.faults else bench_act
+    report = bench(given.seeds or range(10), lambda line: print(line, flush=True), trial, given.jobs)
     if given.json:
         write_json(given.json, report)
     return DONE
+
+
+def kinds(given: str | None) -> tuple[str, ...]:
+    """The kinds of faults that were asked for. Raises BadInput for one that is not known."""
+    from handey_studio.task.bench_faults import FAULTS
+
+    wanted = FAULTS if given == "all" else tuple(given.split(",")) if given else ()
+    unknown = sorted(set(wanted) - set(FAULTS))
+    if unknown:
+        raise BadInput(f'fault "{unknown[0]}" is not known; choose among: {", ".join(FAULTS)}.')
+    return wanted

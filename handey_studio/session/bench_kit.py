@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from handey_studio.base import BadInput
@@ -12,6 +13,8 @@ from handey_studio.session.run import cell_of
 from handey_studio.session.sequence import run_list, states_of
 from handey_studio.session.session import Session, new_session
 from handey_studio.task import MoveCommand
+from handey_studio.task.bench_act import Trial
+from handey_studio.task.shared_out import shared_out
 from handey_studio.world import Library
 
 ROUNDS = 3  # commands that failed are run again when the others are over: what lay on the part may be gone
@@ -34,23 +37,32 @@ def kit_session(seed: int, library: Library, robot: str = "ur5", physics: bool =
     return new_session(f"kit {seed}", made.workcell, library, tuple(MoveCommand(*command) for command in made.commands), seed)
 
 
-def bench_kit(seeds: Iterable[int], library: Library, tell: Callable[[str], None], robot: str = "ur5", attempts: int = 3) -> dict[str, Any]:
+def bench_kit(seeds: Iterable[int], tell: Callable[[str], None], trial: Trial, jobs: int = 1) -> dict[str, Any]:
     """Run every seed's commands to their end; the table as JSON values, a line told for each."""
     rows = []
-    for seed in seeds:
-        try:
-            session = kit_session(seed, library, robot)
-        except BadInput as error:
-            tell(f"{seed:4d} no scene: {error}")
-            continue
-        rows.append(_row(seed, replace(session, attempts=attempts), library))
-        row = rows[-1]
-        times = f"{row['cell_s']:.0f} s of the cell's time, {row['wall_s']:.0f} s"
-        done = f"{row['done']} of {row['commands']} done, {row['truly']} truly there, {row['rounds']} rounds"
-        tell(f"{seed:4d} {done}, {row['incidents']} incidents, {times}; {'; '.join(row['failed'])[:100]}")
+    for found in shared_out(partial(_sorted, trial), seeds, jobs):
+        tell(found if isinstance(found, str) else _line(found))
+        rows += [] if isinstance(found, str) else [found]
     complete = sum(row["done"] == row["commands"] for row in rows)
-    tell(f"{complete} of {len(rows)} sequences complete")
-    return {"schema": "handey/bench/kit/1", "robot": robot, "rows": rows, "summary": {"sequences": len(rows), "complete": complete}}
+    truly = sum(row["truly"] == row["commands"] for row in rows)
+    tell(f"{complete} of {len(rows)} sequences complete, {truly} truly so")
+    summary = {"sequences": len(rows), "complete": complete, "truly": truly}
+    return {"schema": "handey/bench/kit/1", "robot": trial.robot, "rows": rows, "summary": summary}
+
+
+def _sorted(trial: Trial, seed: int) -> dict[str, Any] | str:
+    """The row of a seed, or why there is no scene."""
+    try:
+        session = kit_session(seed, trial.library, trial.robot)
+    except BadInput as error:
+        return f"{seed:4d} no scene: {error}"
+    return _row(seed, replace(session, attempts=trial.attempts), trial.library)
+
+
+def _line(row: dict[str, Any]) -> str:
+    times = f"{row['cell_s']:.0f} s of the cell's time, {row['wall_s']:.0f} s"
+    done = f"{row['done']} of {row['commands']} done, {row['truly']} truly there, {row['rounds']} rounds"
+    return f"{row['seed']:4d} {done}, {row['incidents']} incidents, {times}; {'; '.join(row['failed'])[:300]}"
 
 
 def _row(seed: int, session: Session, library: Library) -> dict[str, Any]:
