@@ -122,7 +122,7 @@ def test_options_that_mean_nothing_are_refused(options, words):
 
 
 def test_a_depth_camera_is_calibrated_by_the_same_procedure(session, library):
-    """The guide.s recipe for a real camera: the same arm and cube before a pinhole camera whose pose is known within a centimetre."""
+    """The guide's recipe for a real camera: the same arm and cube before a pinhole camera whose pose is known within a centimetre."""
     cell = cell_with_cube(session, library, 0.05)
     finder = session.workcell.finder
     down = transform(rotation_about((1, 0, 0), np.deg2rad(172.0)), (0.48, 0.1, 0.95))
