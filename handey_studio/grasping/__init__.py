@@ -21,7 +21,7 @@ from handey_studio.grasping.placements import Placement, PlacementOptions, stabl
 from handey_studio.grasping.plane_outlines import PlaneOutline, plane_outlines
 from handey_studio.grasping.plane_search import SearchOptions, plane_space
 from handey_studio.grasping.ranking import RankTerms, rank_terms
-from handey_studio.grasping.reach import BranchRange, ReachOptions, branch_ranges, within_reach
+from handey_studio.grasping.reach import within_reach
 from handey_studio.grasping.regrasps import GOAL, START, RegraspSequence, SequenceCosts, Transfer, sequences, why_none
 from handey_studio.grasping.rotations import (
     HAND_MARGIN_M,
@@ -39,7 +39,6 @@ __all__ = [
     "GOAL",
     "HAND_MARGIN_M",
     "START",
-    "BranchRange",
     "BumpIterations",
     "BumpLines",
     "BumpOptions",
@@ -62,7 +61,6 @@ __all__ = [
     "PlacementOptions",
     "PlaneOutline",
     "RankTerms",
-    "ReachOptions",
     "RegraspSequence",
     "RotationFault",
     "SearchOptions",
@@ -71,7 +69,6 @@ __all__ = [
     "Transfer",
     "Wanted",
     "angle_range",
-    "branch_ranges",
     "bump_lines",
     "contact_area",
     "contact_areas",

@@ -1,5 +1,6 @@
 """Legal rotations of the hand about a grasp point, at pickup and putdown together (Handey 1987 §5.1, Figures 7 and 8)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Literal
@@ -113,24 +114,28 @@ class LegalRotations(Value):
         along = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         return np.arccos(np.clip(-along @ self.uprights.T, -1.0, 1.0))
 
-    def best(self, count: int) -> list[float]:
-        """Up to `count` legal angles with the fingers most vertical over both ends, well apart."""
+    def candidates(self) -> list[float]:
+        """Legal angles worth a look, those with the fingers most vertical over both ends first."""
         ranges = self.ranges()
         downs = np.arctan2(-self.uprights[:, 1], -self.uprights[:, 0])
         wanted = np.array([self.group.angle, *downs, self.group.angle + np.angle(np.exp(1j * (downs - self.group.angle)).sum())])
         steps = np.arange(self.low, self.high + 1e-9, STEP_RAD)
         angles = np.unique([inside(angle, ranges, INSET_RAD) for angle in (*wanted, *steps)] if ranges else [])
+        return angles[np.argsort(self.tilts(angles).sum(axis=1), kind="stable")].tolist()
+
+    def best(self, count: int, serves: Callable[[float], bool] = lambda _: True) -> list[float]:
+        """The first `count` of the candidates that serve, well apart."""
         chosen: list[float] = []
-        for angle in angles[np.argsort(self.tilts(angles).sum(axis=1), kind="stable")]:
-            if len(chosen) < count and all(abs(angle - other) > 1.5 * STEP_RAD for other in chosen):
-                chosen.append(float(angle))
+        for angle in self.candidates():
+            if len(chosen) < count and all(abs(angle - other) > 1.5 * STEP_RAD for other in chosen) and serves(angle):
+                chosen.append(angle)
         return chosen
 
     def fault(self) -> RotationFault | None:
         """Why no angle is left, if none is."""
         contact = [f for f in self.forbidden if f.what == "contact"]
-        own = [f for f in self.forbidden if f.end == "both"]
         met = [f for f in self.forbidden if f.what != "reach"]
+        own = [f for f in met if f.end == "both"]
         stages: list[tuple[str, End, list[ForbiddenRange]]] = [
             ("the fingers would touch too little of the part at every angle", "both", contact),
             ("the part itself is in the hand's way at every angle", "both", own),

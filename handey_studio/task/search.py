@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Progress, Share
 from handey_studio.geometry.transforms import inverse
-from handey_studio.grasping import GraspPlane, LegalRotations, legal_rotations, rank_terms
+from handey_studio.grasping import GraspPlane, LegalRotations, legal_rotations, rank_terms, within_reach
 from handey_studio.task.carrying import Carried, Kept, Start, join, worst
 from handey_studio.task.detours import detours
 from handey_studio.task.ends import PICKUP, PUTDOWN, End, pickup_end, putdown_end, reachable
@@ -179,12 +179,12 @@ class OptionSearch:
         entry = self.ledger.add("grasp group", option.name, parent=node.entry)
         here = _pickup_of(option)
         rotations = self._shut.get(here) or legal_rotations(option.group, option.pickup, option.putdown)
+        angles, rotations = within_reach(rotations, option.pickup, option.putdown, ANGLES)
         if not rotations.ranges("pickup"):
             self._shut[here] = rotations
-        if not rotations.legal:
+        if not angles:
             fall_illegal(option, rotations, entry, self.ledger)
-            return
-        for angle in rotations.best(ANGLES):
+        for angle in angles:
             cost = node.cost - option.cost + rank_terms(option.group, option.pickup, option.putdown, rotations, angle).cost
             self._push(Node(APPROACH, node.route, (option, rotations, angle), cost, entry))
 
