@@ -10,7 +10,8 @@ import threading
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from handey_studio.app.actions import Bench, put_away, worth_keeping
+from handey_studio.app.actions import Bench
+from handey_studio.app.session_actions import put_away, worth_keeping
 from handey_studio.app.state import State, kept, opened
 from handey_studio.base import BadInput
 from handey_studio.session import Session, read_session, write_session

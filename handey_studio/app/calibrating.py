@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from handey_studio.app.actions import Bench
-from handey_studio.app.disturbing import check_idle
-from handey_studio.app.jobs import JobStarted
+from handey_studio.app.jobs import JobStarted, check_idle
 from handey_studio.app.settings import with_finder_at
 from handey_studio.app.state import State
 from handey_studio.base import BadInput

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handey_studio.app.jobs import check_idle
 from handey_studio.app.settings import with_disturbances
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
@@ -124,12 +125,6 @@ def words_of(fault: Fault) -> str:
         "blocked": f"joint {fault.size + 1:.0f} is jammed",
     }
     return f"{sizes[fault.kind]}, {fault.time_s:g} s into {CALL_WORDS[fault.call]} {fault.count}"
-
-
-def check_idle(state: State) -> None:
-    """Raises BadInput while the planner is at work."""
-    if state.job is not None:
-        raise BadInput("the planner is at work; cancel first or wait for it.")
 
 
 def _with(state: State, label: str, physics: bool, faults: tuple[Fault, ...]) -> State:

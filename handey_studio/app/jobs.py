@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from handey_studio.app.state import Job, State, with_view
+from handey_studio.base import BadInput
 from handey_studio.session import CommandState, Session
 from handey_studio.session.ledger_tree import ROOT
 from handey_studio.session.sequence import states_of
@@ -12,7 +13,14 @@ from handey_studio.task.plan import MoveResult
 
 KINDS = {"planned": "planned", "done": "good", "failed": "bad"}  # of notices
 FIRST_JOB = "Starting the planner; the first time on a machine it compiles for a minute or more, whatever it says that it is at."
+BUSY = "the planner is at work; cancel first or wait for it."
 CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
+
+
+def check_idle(state: State) -> None:
+    """Raises BadInput while the planner is at work."""
+    if state.job is not None:
+        raise BadInput(BUSY)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from handey_studio.app.actions import Bench
-from handey_studio.app.jobs import CANCELLED, JobStarted, at_the_end, merged, outcome
+from handey_studio.app.jobs import CANCELLED, JobStarted, at_the_end, check_idle, merged, outcome
 from handey_studio.app.state import State, with_view
 from handey_studio.base import BadInput
 from handey_studio.session import Session
@@ -13,8 +13,6 @@ from handey_studio.session.destination import anywhere
 from handey_studio.session.sequence import from_the_start, last_run, next_command, run_list, skipped, states_of
 from handey_studio.task.plan import MoveCommand
 from handey_studio.world import Library
-
-BUSY = "the planner is at work; cancel first or wait for it."
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ class SkipCommand:
     """The chosen command is passed over, or no longer."""
 
     def apply(self, state: State) -> State:
-        _check_idle(state)
+        check_idle(state)
         number, states = state.command_number, list(states_of(state.session))
         if number < 0:
             return state
@@ -90,7 +88,7 @@ class StartOver:
     """All commands wait again; the cell stays as it is."""
 
     def apply(self, state: State) -> State:
-        _check_idle(state)
+        check_idle(state)
         return replace(with_view(state, result=-1, attempt=-1, time_s=0.0), session=from_the_start(state.session), playing=False)
 
 
@@ -102,7 +100,7 @@ class RunCommands:
 
     def run(self, bench: Bench) -> State:
         state = bench.state
-        _check_idle(state)
+        check_idle(state)
         if next_command(state.session) is None:
             raise BadInput("every command is done or skipped; press Start over, or add one.")
         job = JobStarted(True, "Running the next command" if self.step else "Running the commands", commands_done)
@@ -138,13 +136,8 @@ def commands_done(state: State, found: Session) -> State:
 
 
 def _edited(state: State, label: str, commands: tuple[MoveCommand, ...]) -> State:
-    _check_idle(state)
+    check_idle(state)
     return with_view(state.changed(label, with_commands(state.session, commands)), hypothesis=-1)
-
-
-def _check_idle(state: State) -> None:
-    if state.job is not None:
-        raise BadInput(BUSY)
 
 
 def _unspoken(session: Session) -> str:

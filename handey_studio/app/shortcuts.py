@@ -4,12 +4,15 @@ from typing import Any
 
 import viser
 
-from handey_studio.app.actions import Follow, LookFrom, SaveSession, StartMove
-from handey_studio.app.commands import Browse, LookAt, Redo, Undo
+from handey_studio.app.actions import StartMove
+from handey_studio.app.commands import Redo, Undo
+from handey_studio.app.looking_at import Browse, LookAt
 from handey_studio.app.modelling.accepting import Accept, Escape
 from handey_studio.app.modelling.steps import RemovePicked
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.playback import SeekStep, TogglePlay
+from handey_studio.app.session_actions import SaveSession
+from handey_studio.app.viewpoints import Follow, LookFrom
 from handey_studio.app.wire import Send, on_trigger
 
 KEYS: tuple[tuple[str, Any, Any, Any], ...] = (

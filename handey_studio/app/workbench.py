@@ -13,10 +13,11 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app.autosave import Autosave
-from handey_studio.app.commands import CameraMoved, Tell, Viewers
+from handey_studio.app.commands import Tell, Viewers
 from handey_studio.app.explaining import Explainer
 from handey_studio.app.handling import Handler
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows
+from handey_studio.app.looking_at import CameraMoved
 from handey_studio.app.modelling.showing import turn_to_model
 from handey_studio.app.modelling.workers import modelling_workers
 from handey_studio.app.palette import BLUE, TEAL, VERMILLION

@@ -6,29 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handey_studio.app.actions import CLOSE_UP, Follow, LookFrom, middle_of
 from handey_studio.app.browsing import ROWS, browsed_hypotheses, edges_shown, page_of, wired
-from handey_studio.app.commands import (
-    Browse,
-    BrowseRow,
-    ChoosePart,
-    FilterEdges,
-    FilterHypotheses,
-    LookAt,
-    PointAt,
-    Select,
-    ShowLayer,
-    Undo,
-)
+from handey_studio.app.commands import Undo
 from handey_studio.app.explaining import Explainer
 from handey_studio.app.jobs import merged
+from handey_studio.app.looking_at import Browse, BrowseRow, FilterEdges, FilterHypotheses, LookAt, PointAt, Select, ShowLayer
 from handey_studio.app.palette import residual_colours
 from handey_studio.app.panels.edges import about_edge, edge_labels, edges_legend, number_of
 from handey_studio.app.panels.explained import explained_html
 from handey_studio.app.panels.rows import hypothesis_rows, percent
 from handey_studio.app.panels.sensing import found_html
 from handey_studio.app.scene.pair import parameter_texts, parameters
+from handey_studio.app.setting_up import ChoosePart
 from handey_studio.app.state import Explained, opened, with_view
+from handey_studio.app.viewpoints import CLOSE_UP, Follow, LookFrom, middle_of
 from handey_studio.base import Entry
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
 from handey_studio.localization import Hypothesis, LocatedPose, Rival

@@ -8,28 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handey_studio.app.browsing import chosen, ledger_page, listed
-from handey_studio.app.commands import (
-    ChoosePart,
-    ChooseRobot,
-    DropGhost,
-    FilterLedger,
-    FreePose,
-    LedgerPage,
-    LedgerRow,
-    LedgerUp,
-    LookAtNoEntry,
-    PointAt,
-    Redo,
-    ResetCell,
-    Select,
-    SetDestination,
-    SetSeed,
-    ShowLayer,
-    Undo,
-)
+from handey_studio.app.commands import Redo, Undo
 from handey_studio.app.guidance import next_step
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows, JobStarted
+from handey_studio.app.ledger_commands import FilterLedger, LedgerPage, LedgerRow, LedgerUp, LookAtNoEntry
+from handey_studio.app.looking_at import PointAt, Select, ShowLayer
 from handey_studio.app.playback import Seek, SeekStep, SetPlayback, Tick, TogglePlay
+from handey_studio.app.setting_up import ChoosePart, ChooseRobot, DropGhost, FreePose, ResetCell, SetDestination, SetSeed
 from handey_studio.app.settings import Settings
 from handey_studio.app.state import MAX_UNDO, opened
 from handey_studio.base import BadInput, Ledger

@@ -10,7 +10,7 @@ import pytest
 from handey_studio.app import autosave
 from handey_studio.app.autosave import Autosave, LetGo, Offer, TakeUp, left_behind, own_copy
 from handey_studio.app.calibrating import AcceptCalibration, Misplace, calibration_done, is_misplaced
-from handey_studio.app.commands import Redo, SetAttempts, SetDestination, SetImprove, SetSeed, Undo
+from handey_studio.app.commands import Redo, Undo
 from handey_studio.app.disturbing import KINDS, AddFault, ClearFaults, SetPhysics, words_of
 from handey_studio.app.exporting import exported
 from handey_studio.app.happened import LookAtHappening, happenings
@@ -30,6 +30,7 @@ from handey_studio.app.sequence import (
     StartOver,
     commands_done,
 )
+from handey_studio.app.setting_up import SetAttempts, SetDestination, SetImprove, SetSeed
 from handey_studio.app.state import opened, with_view
 from handey_studio.app.svg_plots import cursor, plots_html, plots_of
 from handey_studio.base import BadInput

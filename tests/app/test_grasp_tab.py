@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from handey_studio.app.background import Background
-from handey_studio.app.commands import ChoosePart
 from handey_studio.app.grasp_commands import LookAtStanding, LookAway, PickCell, PickClass, ShowObstacles, looked_at, standing_pose
 from handey_studio.app.handling import Handle
+from handey_studio.app.setting_up import ChoosePart
 from handey_studio.app.state import Handled, opened
 from handey_studio.app.svg import PlaneView
 from handey_studio.app.svg_classes import classes_html

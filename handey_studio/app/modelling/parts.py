@@ -3,10 +3,10 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from handey_studio.app.commands import FREE_TABLE
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import Material
 from handey_studio.app.modelling.scanning import Order, fresh
+from handey_studio.app.setting_up import FREE_TABLE
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.base.errors import unknown_name

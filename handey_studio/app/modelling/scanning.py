@@ -4,10 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from handey_studio.app.actions import OpenSession
 from handey_studio.app.jobs import JobStarted
 from handey_studio.app.modelling.look import SELECT, ModelLook, Waiting
 from handey_studio.app.planner import Run
+from handey_studio.app.session_actions import OpenSession
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.modeling.draft import Draft, with_scan

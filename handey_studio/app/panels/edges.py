@@ -6,7 +6,7 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.browsing import edges_shown
-from handey_studio.app.commands import FilterEdges, Select
+from handey_studio.app.looking_at import FilterEdges, Select
 from handey_studio.app.palette import css
 from handey_studio.app.panels.move import choose
 from handey_studio.app.scene.sensing import KIND_COLOURS, chosen_edge

@@ -7,7 +7,7 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.browsing import LEDGER_ROWS, filtered, ledger_of, ledger_page, listed
-from handey_studio.app.commands import FilterLedger, LedgerPage, LedgerRow, LedgerUp, LookAtNoEntry
+from handey_studio.app.ledger_commands import FilterLedger, LedgerPage, LedgerRow, LedgerUp, LookAtNoEntry
 from handey_studio.app.palette import css
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to

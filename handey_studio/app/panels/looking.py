@@ -3,11 +3,11 @@
 import viser
 
 from handey_studio.app import html, palette
-from handey_studio.app.actions import LookFrom
-from handey_studio.app.commands import ShowLayer
+from handey_studio.app.looking_at import ShowLayer
 from handey_studio.app.palette import ELEVATION, ELEVATION_AT
 from handey_studio.app.scene.depth import elevation_span
 from handey_studio.app.state import State
+from handey_studio.app.viewpoints import LookFrom
 from handey_studio.app.wire import Send, on_click, on_user, set_to
 from handey_studio.session import LAYERS
 

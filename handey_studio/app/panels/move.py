@@ -7,22 +7,21 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove, StartMove
-from handey_studio.app.commands import (
+from handey_studio.app.commands import Redo, Undo
+from handey_studio.app.guidance import next_step, stages
+from handey_studio.app.panels.commands import CommandsPanel
+from handey_studio.app.scene.destination import ghost_pose
+from handey_studio.app.setting_up import (
     POSE_LABEL,
     ChoosePart,
     ChooseRobot,
     FreePose,
-    Redo,
     ResetCell,
     SetAttempts,
     SetDestination,
     SetImprove,
     SetSeed,
-    Undo,
 )
-from handey_studio.app.guidance import next_step, stages
-from handey_studio.app.panels.commands import CommandsPanel
-from handey_studio.app.scene.destination import ghost_pose
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
 from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy

@@ -7,13 +7,13 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import html
-from handey_studio.app.actions import Follow, LookFrom
 from handey_studio.app.browsing import ROWS, browsed_hypotheses, page_of
-from handey_studio.app.commands import Browse, BrowseRow, FilterHypotheses, LookAt
+from handey_studio.app.looking_at import Browse, BrowseRow, FilterHypotheses, LookAt
 from handey_studio.app.panels.explained import explained_html
 from handey_studio.app.panels.move import choose
 from handey_studio.app.panels.rows import could_also_be, hypothesis_rows
 from handey_studio.app.state import State
+from handey_studio.app.viewpoints import Follow, LookFrom
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.geometry.transforms import to_xyz_rpy
 from handey_studio.session import Session

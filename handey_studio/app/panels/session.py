@@ -5,8 +5,8 @@ from typing import Any
 import viser
 
 from handey_studio.app import html
-from handey_studio.app.actions import DownloadSession, NewSession, OpenSession, SaveSession, SaveSessionAs, UploadSession
 from handey_studio.app.autosave import LetGo, TakeUp
+from handey_studio.app.session_actions import DownloadSession, NewSession, OpenSession, SaveSession, SaveSessionAs, UploadSession
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_upload, set_to
 

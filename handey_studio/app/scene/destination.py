@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from handey_studio.app import palette
-from handey_studio.app.commands import Command, DropGhost
+from handey_studio.app.commands import Command
 from handey_studio.app.scene.parts import add_solid
 from handey_studio.app.scene.units import metres, place
+from handey_studio.app.setting_up import DropGhost
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import transform

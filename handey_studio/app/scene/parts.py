@@ -5,8 +5,8 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import palette
-from handey_studio.app.commands import ChoosePart
 from handey_studio.app.scene.units import place, scaled
+from handey_studio.app.setting_up import ChoosePart
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click
 from handey_studio.world import Part

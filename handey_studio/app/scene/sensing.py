@@ -5,7 +5,7 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.browsing import edges_shown
-from handey_studio.app.commands import PointAt
+from handey_studio.app.looking_at import PointAt
 from handey_studio.app.scene.units import metres, scaled
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_scene_click
