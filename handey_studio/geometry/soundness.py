@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+AT_ONCE = 256  # edges: what is worked out for all triangles together should stay in the processor's caches
+
 
 def unmatched_sides(sides: NDArray) -> tuple[NDArray, NDArray]:
     """Of directed sides (n, 2) as corner numbers: those whose opposite is missing (k, 2), and those that are there twice or more (j, 2)."""
@@ -22,19 +24,23 @@ def crossings(corners: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray, N
     a, b, c = (corners[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     reach = 1e-9 * np.linalg.norm(normals, axis=1)
-    points, pierced, through = [np.empty((0, 3))], [np.empty(0, dtype=int)], []
-    for side in sides:
-        p, q = corners[side]
-        d_p, d_q = ((p - a) * normals).sum(axis=1), ((q - a) * normals).sum(axis=1)
-        maybe = (d_p * d_q < 0) & (np.abs(d_p) > reach) & (np.abs(d_q) > reach)
-        maybe &= ~((triangles == side[0]) | (triangles == side[1])).any(axis=1)
-        if maybe.any():
-            t = (d_p[maybe] / (d_p[maybe] - d_q[maybe]))[:, None]
-            x = p + t * (q - p)
-            n = normals[maybe]
-            u = (a[maybe], b[maybe], c[maybe])
-            inside = np.logical_and.reduce([np.einsum("ij,ij->i", np.cross(u[k - 2] - u[k], x - u[k]), n) > 0 for k in range(3)])
-            points.append(x[inside])
-            pierced.append(np.nonzero(maybe)[0][inside])
-            through += [side] * int(inside.sum())
-    return np.concatenate(points), np.concatenate(pierced), np.array(through, dtype=int).reshape(-1, 2)
+    heights = (corners - corners[0]) @ normals.T - ((a - corners[0]) * normals).sum(axis=1)
+    side_of = np.where(heights > reach, 1, np.where(heights < -reach, -1, 0)).astype(np.int8)
+    found = [_through(side_of, triangles, sides[k : k + AT_ONCE], k) for k in range(0, len(sides), AT_ONCE)]
+    edge, triangle = np.concatenate([np.empty((2, 0), dtype=int), *found], axis=1)
+    p, q = corners[sides[edge, 0]], corners[sides[edge, 1]]
+    d_p, d_q = heights[sides[edge, 0], triangle], heights[sides[edge, 1], triangle]
+    points = p + (d_p / (d_p - d_q))[:, None] * (q - p)
+    u, n = (a[triangle], b[triangle], c[triangle]), normals[triangle]
+    inside = np.logical_and.reduce([np.einsum("ij,ij->i", np.cross(u[k - 2] - u[k], points - u[k]), n) > 0 for k in range(3)])
+    return points[inside], triangle[inside], sides[edge[inside]]
+
+
+def _through(side_of: NDArray, triangles: NDArray, sides: NDArray, first: int) -> NDArray:
+    """Pairs (2, k) of an edge, numbered from `first`, and a triangle without its ends whose plane it passes through.
+
+    `side_of` (n, m): on which side of the plane of each triangle each corner lies, 0 when it is in it.
+    """
+    edge, triangle = np.nonzero(side_of[sides[:, 0]] * side_of[sides[:, 1]] < 0)
+    apart = (triangles[triangle][:, :, None] != sides[edge][:, None, :]).all(axis=(1, 2))
+    return np.stack([edge[apart] + first, triangle[apart]])

@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 
 from handey_studio.base import measured
 from handey_studio.geometry import Face, Polyhedron
-from handey_studio.geometry.polyhedron import WELD_M
+from handey_studio.geometry.meshes import WELD_M
 from handey_studio.geometry.soundness import crossings, unmatched_sides
 from handey_studio.modeling.truth_values import Check
 from handey_studio.world.model_files import MAX_SIZE_M, MIN_SIZE_M

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from handey_studio.base import BadInput, Value, measured
 from handey_studio.geometry import Polyhedron, polyhedron_from_polygons
-from handey_studio.geometry.polyhedron import MAX_TRIANGLES, check_closed, triangles_of, welded
+from handey_studio.geometry.meshes import MAX_TRIANGLES, check_closed, triangles_of, welded
 from handey_studio.world.model_files import MESH_SUFFIXES, Mesh, read_mesh
 from handey_studio.world.part import Part, Provenance
 from handey_studio.world.simplify import MAX_TRIANGLES as MOST_SIMPLIFIED

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
+from handey_studio.base.files import replace_file
 from handey_studio.geometry import Polyhedron, polyhedron_from_polygons
 from handey_studio.world.numbering import numbered_as, pieces
 from handey_studio.world.part import Part
@@ -72,8 +73,8 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def write_obj(path: str | os.PathLike, solid: Polyhedron) -> None:
-    """Write a solid as OBJ, in metres."""
-    Path(path).write_text(obj_text(solid))
+    """Write a solid as OBJ, in metres: the file is the old one or the new one whole, whatever happens meanwhile. Raises OSError."""
+    replace_file(Path(path), obj_text(solid).encode())
 
 
 def obj_text(solid: Polyhedron) -> str:

@@ -34,6 +34,31 @@ def test_triangulated_input_gets_its_polygon_faces_back(seed):
     assert sum(edge.dihedral < 0 for edge in again.edges) == 1
 
 
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000))
+def test_slivers_along_edges_join_no_faces_that_are_not_coplanar(seed):
+    """An edge between two faces, split on one side only: the triangle without area between them touches both."""
+    rng = np.random.default_rng(seed)
+    solid = prism(L_OUTLINE, 0.04)
+    corners, triangles = apply(from_xyz_rpy(rng.uniform(-1, 1, 3), rng.uniform(-3, 3, 3)), solid.vertices), solid.triangles.tolist()
+    for _ in range(rng.integers(1, 8)):
+        number = int(rng.integers(len(triangles)))
+        a, b, c = np.roll(triangles.pop(number), rng.integers(3)).tolist()
+        corners = np.vstack([corners, corners[a] + rng.uniform(0.1, 0.9) * (corners[b] - corners[a]) + rng.normal(0, 5e-9, 3)])
+        middle = len(corners) - 1
+        triangles += [[a, middle, c], [middle, b, c], [a, b, middle]]
+    again = polyhedron_from_polygons(corners, [triangles[k] for k in rng.permutation(len(triangles))])
+    assert sorted(len(face.outer) for face in again.faces) == [4, 4, 4, 4, 4, 4, 6, 6]
+    assert np.isclose(again.volume_and_centroid[0], solid.volume_and_centroid[0], rtol=1e-5)
+
+
+def test_corners_either_side_of_a_grid_line_are_one():
+    corners = np.vstack([box((0.1, 0.1, 0.1)).vertices, box((0.1, 0.1, 0.1)).vertices]) + 0.5e-6 + np.repeat([[0.0], [1e-9]], 8, axis=0)
+    polygons = [[c + 8 * (f % 2) for c in face.outer] for f, face in enumerate(box((0.1, 0.1, 0.1)).faces)]
+    solid = polyhedron_from_polygons(corners, polygons)
+    assert len(solid.vertices) == 8 and len(solid.faces) == 6
+
+
 def test_a_face_with_a_hole_keeps_it():
     ring = trimesh.creation.annulus(0.02, 0.05, 0.03, sections=8)
     solid = polyhedron_from_polygons(ring.vertices, ring.faces.tolist())

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from handey_studio.base import rejected_counts
 from handey_studio.geometry import box, prism
 from handey_studio.geometry.convex import hull_triangles
-from handey_studio.geometry.polyhedron import polyhedron_from_polygons
+from handey_studio.geometry.meshes import polyhedron_from_polygons
 from handey_studio.geometry.transforms import apply, rotation_about
 from handey_studio.grasping import PlacementOptions, stable_placements
 from handey_studio.world import Library, Part

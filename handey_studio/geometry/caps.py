@@ -10,14 +10,16 @@ def without_caps(vertices: NDArray, triangles: NDArray, thin: float) -> NDArray:
     Such a cap has its middle corner on its longest side; the triangle beyond that side is split at this corner, which closes the gap.
     Caps that lie back to back go together.
     """
+    waiting = np.flatnonzero(_are_caps(vertices[triangles], thin)).tolist()
+    if not waiting:
+        return triangles
     kept = {k: tuple(int(c) for c in triangle) for k, triangle in enumerate(triangles)}
     owner = {side: k for k, triangle in kept.items() for side in _sides(triangle)}
-    waiting = [k for k, triangle in kept.items() if _is_cap(vertices, triangle, thin)]
     most = 4 * len(kept)
     while waiting and most:
         most -= 1
         k = waiting.pop()
-        if k not in kept or not _is_cap(vertices, kept[k], thin):
+        if k not in kept or not _are_caps(vertices[[kept[k]]], thin)[0]:
             continue
         a, b, middle = _longest_first(vertices, kept[k])
         beyond = owner.get((b, a))
@@ -42,10 +44,10 @@ def _sides(triangle: tuple[int, ...]) -> list[tuple[int, int]]:
     return [(a, b), (b, c), (c, a)]
 
 
-def _is_cap(vertices: NDArray, triangle: tuple[int, ...], thin: float) -> bool:
-    a, b, c = vertices[list(triangle)]
-    sides = max(np.linalg.norm(b - a), np.linalg.norm(c - b), np.linalg.norm(a - c))
-    return bool(np.linalg.norm(np.cross(b - a, c - a)) < thin * sides)
+def _are_caps(corners: NDArray, thin: float) -> NDArray:
+    """Which triangles, corners (n, 3, 3) [m], are less than `thin` high."""
+    sides = np.roll(corners, -1, axis=1) - corners
+    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) < thin * np.linalg.norm(sides, axis=2).max(axis=1)
 
 
 def _longest_first(vertices: NDArray, triangle: tuple[int, ...]) -> tuple[int, int, int]:
