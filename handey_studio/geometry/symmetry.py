@@ -24,11 +24,12 @@ def symmetries(solid: Polyhedron, tolerance: float = SAME_M) -> NDArray:
     tree = KDTree(corners)
     radii = np.linalg.norm(corners, axis=1)
     first, second = _frame_corners(corners)
+    dots, crossed = corners @ corners.T, np.linalg.norm(np.cross(corners[:, None], corners[None]), axis=-1)
     found = [np.eye(4)]
     for i, j in permutations(range(len(corners)), 2):
         if abs(radii[i] - radii[first]) > tolerance or abs(radii[j] - radii[second]) > tolerance:
             continue
-        if abs(corners[i] @ corners[j] - corners[first] @ corners[second]) > tolerance * solid.diameter:
+        if max(abs(dots[i, j] - dots[first, second]), abs(crossed[i, j] - crossed[first, second])) > tolerance * solid.diameter:
             continue
         R = _basis(corners[i], corners[j]) @ _basis(corners[first], corners[second]).T
         distances, image = tree.query(corners @ R.T)

@@ -83,7 +83,14 @@ def test_convex_pieces_fill_the_solid_exactly(outline):
 
 
 @pytest.mark.parametrize(
-    ("solid", "count"), [(box((0.1, 0.2, 0.3)), 4), (box((0.1, 0.1, 0.3)), 8), (box((0.1, 0.1, 0.1)), 24), (prism(L_OUTLINE, 0.04), 1)]
+    ("solid", "count"),
+    [
+        (box((0.1, 0.2, 0.3)), 4),
+        (box((0.1, 0.1, 0.3)), 8),
+        (box((0.1, 0.1, 0.1)), 24),
+        (box((0.002, 0.002, 0.08)), 8),
+        (prism(L_OUTLINE, 0.04), 1),
+    ],
 )
 def test_symmetries_are_found_from_the_shape(solid, count):
     found = symmetries(solid)
