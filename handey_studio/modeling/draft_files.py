@@ -92,7 +92,7 @@ def operation_from_plain(plain: Any, index: int) -> Operation:
 def _plain_scan(scan: Scan) -> dict[str, Any]:
     view = scan.view
     shown = next(name for name, kind in PROJECTIONS.items() if isinstance(view.projection, kind))
-    rest = to_plain({"noise": view.noise, "outline_error": view.outline_error})
+    rest = to_plain({"noise": view.noise, "outline_error": view.outline_error, "rim_px": view.rim_px})
     arrays = to_plain({"depth": view.depth, "T_world_sensor": view.T_world_sensor})
     return {"name": scan.name, "source": scan.source, "projection": {"kind": shown} | to_plain(view.projection)} | rest | arrays
 
@@ -120,11 +120,12 @@ def _view(plain: dict[str, Any]) -> DepthView:
         raise BadInput(f"its depth has the shape {getattr(depth, 'shape', '?')}; it must be rows and columns of up to {MAX_PIXELS} pixels.")
     if not is_rigid(T, tolerance=1e-5):
         raise BadInput("its T_world_sensor is not a rigid transform: a proper rotation, metres, last row 0 0 0 1.")
-    noise, outline = (_metres(arrays[key], f"its {key} [m]") for key in ("noise", "outline_error"))
-    return DepthView(depth, shown, T, noise, outline)
+    noise, outline = (_up_to_one(arrays[key], f"its {key} [m]") for key in ("noise", "outline_error"))
+    rim = _up_to_one(plain.get("rim_px", 0.5), "its rim_px")
+    return DepthView(depth, shown, T, noise, outline, rim)
 
 
-def _metres(value: Any, what: str) -> float:
+def _up_to_one(value: Any, what: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise BadInput(f"{what} is {str(value)[:40]!r}; it must be a number.")
     return number(value, what, 0.0, 1.0)

@@ -10,8 +10,8 @@ from handey_studio.geometry.transforms import apply
 from handey_studio.modeling.patches import Border, Crease, Patch, Patches
 from handey_studio.modeling.patches_bodies import bodies_of, creases_of
 from handey_studio.modeling.patches_growing import grown, normals_of, planes_of
-from handey_studio.modeling.patches_outlines import area_of, outlines_of
-from handey_studio.modeling.patches_sides import SUPPORT, Seen, lost_at_rims
+from handey_studio.modeling.patches_outlines import area_of, contours_of, outlines_of, rims_of
+from handey_studio.modeling.patches_sides import SUPPORT, Seen, drift_of, lost_at_rims
 from handey_studio.modeling.patches_windows import Field, field_of
 from handey_studio.modeling.scans import Scan
 from handey_studio.sensing.depth_view import DepthView
@@ -119,7 +119,10 @@ def _told(view: DepthView, labels: NDArray, planes: NDArray, sigma: NDArray, poi
     """The patches with their outlines; regions without a simple outline stay readings that belong to no patch."""
     seen = Seen(view, labels, planes, sigma, lost_at_rims(view))
     parts = find_objects(labels + 1)
-    outlines = [outlines_of(seen, k, parts[k]) for k in range(len(planes))]
+    contours = [contours_of(seen, k, parts[k]) for k in range(len(planes))]
+    rims = [rim for k, found in enumerate(contours) for contour in found for rim in rims_of(seen, k, contour)]
+    seen = seen._replace(drift_px=drift_of(rims))
+    outlines = [outlines_of(seen, k, found) for k, found in enumerate(contours)]
     kept = [k for k, found in enumerate(outlines) if found]
     number = np.full(len(planes) + 2, -1)  # the last two for "none" and "support", -1 and -2
     number[kept] = np.arange(len(kept))

@@ -3,6 +3,7 @@
 Where two planes meet, their intersection is the side; where the object ends, the contour is, with what the sensor loses there added back.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
@@ -20,7 +21,17 @@ COARSER = (1.0, 1.6, 2.5)  # times as much where the sides would cross one anoth
 LEAST_SIDE_PX, SAME_LINE = 0.3, np.cos(np.deg2rad(1.0))
 SHORT = 3.5  # slacks: a shorter side may be a rounded corner
 MEET_SLACKS, MEET_PX = 6.0, 8.0  # lines that meet farther from their corner do not make it
+RIM_SHARE = 0.7  # of the pixels of a stretch that is a rim
 TRIM = 0.12  # of a side at each end belongs to the corner
+
+
+class Contour(NamedTuple):
+    """The outermost pixels (n, 2) of a patch, or those around a hole in it, in order, and what lies beyond each, as `beyond_of` tells."""
+
+    pixels: NDArray
+    hole: bool
+    kinds: NDArray
+    others: NDArray
 
 
 class Outline(NamedTuple):
@@ -30,11 +41,8 @@ class Outline(NamedTuple):
     borders: tuple[Border, ...]
 
 
-def outlines_of(seen: Seen, number: int, part: tuple[slice, slice]) -> list[Outline]:
-    """The outer outline of a patch, counter-clockwise seen from outside, and those of its holes, clockwise; empty when it has none.
-
-    `part` is the rectangle of the image that the patch lies in.
-    """
+def contours_of(seen: Seen, number: int, part: tuple[slice, slice]) -> list[Contour]:
+    """The outer contour of a patch, then those of its holes. `part` is the rectangle of the image that the patch lies in."""
     top, left = part[0].start - 1, part[1].start - 1
     mask = np.pad((seen.labels[part] == number).astype(np.uint8), 1)
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
@@ -45,8 +53,26 @@ def outlines_of(seen: Seen, number: int, part: tuple[slice, slice]) -> list[Outl
         return []
     outer = max((k for k in range(len(contours)) if tree[0][k][3] < 0), key=lambda k: cv2.contourArea(contours[k]))
     chosen = [outer, *(k for k in range(len(contours)) if tree[0][k][3] == outer and _is_hole(seen, contours[k], left, top))]
-    found = [_outline(seen, number, contours[k][:, 0] + np.array([left, top], float), k != outer) for k in chosen]
-    return [outline for outline in found if outline is not None] if found[0] is not None else []
+    found = []
+    for k in chosen:
+        pixels = contours[k][:, 0] + np.array([left, top], float)
+        found.append(Contour(pixels, k != outer, *beyond_of(seen, number, pixels)))
+    return found
+
+
+def outlines_of(seen: Seen, number: int, contours: Sequence[Contour]) -> list[Outline]:
+    """The outer outline of a patch, counter-clockwise seen from outside, and those of its holes, clockwise; empty when it has none."""
+    found = [_outline(seen, number, contour) for contour in contours]
+    return [outline for outline in found if outline is not None] if found and found[0] is not None else []
+
+
+def rims_of(seen: Seen, number: int, contour: Contour) -> list[NDArray]:
+    """The stretches (n, 2) [px] of a contour where the object ends, each about straight, in order."""
+    if len(contour.pixels) < 8:
+        return []
+    corners = _corner_numbers(contour.pixels, _slack(seen, scale_of(seen, contour.pixels, number)))
+    stretches = [_trimmed(a, b, len(contour.pixels)) for a, b in zip(corners, np.roll(corners, -1), strict=True)]
+    return [contour.pixels[stretch] for stretch in stretches if (contour.kinds[stretch] == "r").mean() > RIM_SHARE]
 
 
 def _is_hole(seen: Seen, contour: NDArray, left: int, top: int) -> bool:
@@ -60,35 +86,36 @@ def _is_hole(seen: Seen, contour: NDArray, left: int, top: int) -> bool:
     return bool(np.isfinite(seen.view.depth[v + low[1] + top, u + low[0] + left]).mean() > LEAST_HOLE)
 
 
-def _outline(seen: Seen, number: int, contour: NDArray, hole: bool) -> Outline | None:
-    """The outline with straight sides of a closed contour (n, 2) [px] of patch `number`; None if it cannot be had without crossings."""
-    if len(contour) < 8:
+def _outline(seen: Seen, number: int, contour: Contour) -> Outline | None:
+    """The outline with straight sides of a contour of patch `number`; None if it cannot be had without crossings."""
+    if len(contour.pixels) < 8:
         return None
-    beyond = beyond_of(seen, number, contour)
-    pixels_per_m = scale_of(seen, contour, number)
-    slack = max(SIMPLE_PX, RAGGED * seen.view.outline_error * pixels_per_m)
+    pixels_per_m = scale_of(seen, contour.pixels, number)
     for coarser in COARSER:
-        found = _polygon(seen, number, contour, beyond, slack * coarser, pixels_per_m)
+        found = _polygon(seen, number, contour, _slack(seen, pixels_per_m) * coarser, pixels_per_m)
         if found is not None and is_simple(found.ring, seen.planes[number, :3]):
             ring, borders = found
-            if (_signed_area(ring, seen.planes[number, :3]) < 0) != hole:
+            if (_signed_area(ring, seen.planes[number, :3]) < 0) != contour.hole:
                 ring, borders = ring[::-1], (*borders[-2::-1], borders[-1])
             return Outline(ring, borders)
     return None
 
 
-def _polygon(
-    seen: Seen, number: int, contour: NDArray, beyond: tuple[NDArray, NDArray], slack: float, pixels_per_m: float
-) -> Outline | None:
+def _slack(seen: Seen, pixels_per_m: float) -> float:
+    """How far [px] a contour may leave its straight sides."""
+    return max(SIMPLE_PX, RAGGED * seen.view.outline_error * pixels_per_m)
+
+
+def _polygon(seen: Seen, number: int, contour: Contour, slack: float, pixels_per_m: float) -> Outline | None:
     """Straight sides that leave the contour by at most about `slack` [px]."""
-    corners = _corner_numbers(contour, slack)
+    corners = _corner_numbers(contour.pixels, slack)
     if len(corners) < 3:
         return None
     sides = []
     for a, b in zip(corners, np.roll(corners, -1), strict=True):
-        inside = _trimmed(a, b, len(contour))
-        sides.append(side_of(seen, number, contour[inside], beyond[0][inside], beyond[1][inside]))
-    sides, places = moved_out(sides, seen.lost_m * pixels_per_m, pixels_per_m), contour[corners]
+        inside = _trimmed(a, b, len(contour.pixels))
+        sides.append(side_of(seen, number, contour.pixels[inside], contour.kinds[inside], contour.others[inside]))
+    sides, places = moved_out(seen, sides, pixels_per_m), contour.pixels[corners]
     while len(sides) > 2:
         corners = _met(sides, places, slack)
         drop = next((k for k in (_repeated(sides), _needless(sides, places, slack), _pointless(corners)) if k is not None), None)

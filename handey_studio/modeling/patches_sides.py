@@ -20,23 +20,27 @@ NEAR_CREASE_PX = 5.0  # a crease that the planes put farther from the contour is
 PARALLEL_RAD = np.deg2rad(12.0)
 SUPPORT = -2
 MOST_LOST_M = 0.0025  # depth cameras lose 3 to 5 mm; what is measured beyond comes from other things beside the outlines
-# a rim that wanders [px] is lost by up to so many times as much; whole pixels alone wander by so much [px²]
-WANDERS, ROUNDING = 4.0, 1.0 / 12.0
+SCATTER = np.sqrt(3.0)  # deviations between the mean of what is spread evenly and its end
+DRIFTS = 4.0  # a rim that drifts by so much [px] is lost by up to so many times as much
+DRIFT_PX, MOST_OFF_PX, LEAST_RIM_PX = 2, 3.0, 16  # pixels so far apart drift alike but err each for itself; on a rim so long
+CHANCE_PX2 = 0.05  # that much they have in common by whole pixels and chance
 MOST_SLANT = 1.5  # surfaces seen flatly lose more of their rims, up to so many times as much
-LOST_UNSURE = 0.35  # what a sensor loses at rims is known to so much of it
+LOST_UNSURE, LEAST_UNSURE_PX = 0.35, 0.1  # what a sensor loses at rims is known to so much of it, and to so much at best
 LEAST_OFF_PX, ALIKE_PX = 0.3, 6.0  # a contour's pixels err by so much at least, and so many neighbours alike
 NAMES = {"r": "rim", "k": "cut", "i": "image"}
 
 
 class Seen(NamedTuple):
     """What outlines are made from: the view, `labels` (H, W) with -2 for the support, world planes (n, 4) as normal and offset, readings'
-    `sigma` (H, W) [m], and how far the true outline lies outside the outermost readings [px at 1 m, or anywhere], as `lost_m`."""
+    `sigma` (H, W) [m], how far the true outline may lie outside the outermost readings, `lost_m`, and how much rims drift [px]: by how
+    much several pixels together lie farther in or out than a straight line."""
 
     view: DepthView
     labels: NDArray
     planes: NDArray
     sigma: NDArray
     lost_m: float
+    drift_px: float = 0.0
 
 
 class Side(NamedTuple):
@@ -111,22 +115,45 @@ def side_of(seen: Seen, number: int, contour: NDArray, kinds: NDArray, others: N
     return Side(Border(NAMES.get(kind, "rim"), other, sigma_px * per_px), middle, along, outward, off, per_px)
 
 
-def moved_out(sides: Sequence[Side], lost_px: float, pixels_per_m: float) -> list[Side]:
-    """The sides with the rims where the object ends: half a pixel out, and what the sensor lost, up to `lost_px` [px].
-
-    How far the patch's rims wander tells how much that can be: a sensor that keeps them straight lost nothing.
-    """
-    rims = [side for side in sides if side.border.kind in ("rim", "image")]
-    wander = float(np.median([np.sqrt(max(0.0, side.off**2 - ROUNDING)) for side in rims])) if rims else 0.0
+def moved_out(seen: Seen, sides: Sequence[Side], pixels_per_m: float) -> list[Side]:
+    """The sides with the rims where the object ends, as far out as the sensor lost it."""
     out = []
     for side in sides:
         if side.border.kind in ("rim", "image"):
-            slant = float(np.clip(side.per_px * pixels_per_m, 1.0, MOST_SLANT))
-            lost = 0.5 + min(max(0.0, lost_px - 0.5), WANDERS * wander) * slant
-            sigma = float(np.hypot(side.border.sigma, LOST_UNSURE * lost * side.per_px))
+            lost, unsure = _lost_px(seen, side, pixels_per_m)
+            sigma = float(np.hypot(side.border.sigma, unsure * side.per_px))
             side = side._replace(middle=side.middle + lost * side.outward, border=replace(side.border, sigma=sigma))
         out.append(side)
     return out
+
+
+def _lost_px(seen: Seen, side: Side, pixels_per_m: float) -> tuple[float, float]:
+    """How far [px] a rim lies outside the mean of its outermost pixels, and how well that is known.
+
+    Readings that are whole pixels, or are lost each by chance, spread evenly from the rim inwards: their deviation tells where they end.
+    Sensors that match patches of a pattern lose a margin whose width drifts along the rim: the more it drifts, the wider it is.
+    """
+    scatter = np.sqrt(max(0.0, side.off**2 - seen.drift_px**2))
+    by_chance = max(seen.view.rim_px, SCATTER * scatter - (0.5 - seen.view.rim_px))
+    slant = float(np.clip(side.per_px * pixels_per_m, 1.0, MOST_SLANT))
+    margin = min(max(0.0, seen.lost_m * pixels_per_m - 0.5), DRIFTS * seen.drift_px) * slant
+    return by_chance + margin, float(np.hypot(LEAST_UNSURE_PX, LOST_UNSURE * margin))
+
+
+def drift_of(rims: Sequence[NDArray]) -> float:
+    """How much [px] rims, each the pixels (n, 2) along a straight one in order, drift about straight lines: the root of what errors of
+    pixels a little apart have in common, over all rims; 0 where that is chance."""
+    total = count = 0.0
+    for pixels in rims:
+        if len(pixels) < LEAST_RIM_PX:
+            continue
+        middle, along, _ = _line(pixels)
+        off = (pixels - middle) @ np.array([-along[1], along[0]])
+        off = off - off.mean()
+        one, other = off[DRIFT_PX:], off[:-DRIFT_PX]
+        both = (np.abs(one) < MOST_OFF_PX) & (np.abs(other) < MOST_OFF_PX)
+        total, count = total + float((one * other)[both].sum()), count + int(both.sum())
+    return float(np.sqrt(max(0.0, total / max(count, 1.0) - CHANCE_PX2)))
 
 
 def _metres_across(seen: Seen, number: int, middle: NDArray, along: NDArray, outward: NDArray) -> float:

@@ -19,7 +19,7 @@ class DepthMap(Value):
 
     Cell (j, i) covers x in [i, i + 1)·cell and y in [j, j + 1)·cell of the range frame. `passed` (ny, nx) [m] is the lowest height
     above each cell that light on its way to a reading, or from it to a camera, went through: the space above it is empty. It is the
-    elevation itself where there is one, and `SKY_M` where no such light passed. `noise` and `outline_error` [m] as in `DepthView`.
+    elevation itself where there is one, and `SKY_M` where no such light passed. `noise`, `outline_error` [m] and `rim_px` as in `DepthView`.
     """
 
     elevation: NDArray
@@ -28,6 +28,7 @@ class DepthMap(Value):
     passed: NDArray
     noise: float = 0.0005
     outline_error: float = 0.001
+    rim_px: float = 0.5
 
     def __post_init__(self) -> None:
         for key in ("elevation", "T_world_range", "passed"):
@@ -43,6 +44,7 @@ class DepthMap(Value):
             self.T_world_range @ T_range_sensor,
             self.noise,
             self.outline_error,
+            self.rim_px,
         )
 
     def points_world(self) -> NDArray:

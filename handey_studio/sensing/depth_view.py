@@ -69,7 +69,8 @@ class DepthView(Value):
 
     `T_world_sensor` maps the optical frame (x right, y down, z forward) to the world. `noise` [m] is the standard
     deviation of a reading on a plane; `outline_error` [m] how far a silhouette may lie off sideways, as depth cameras
-    drop readings at jump edges.
+    drop readings at jump edges. `rim_px`: how far it lies outside the middles of its outermost pixels where nothing is dropped:
+    half a pixel if each pixel is one reading, less if the highest of several wins.
     """
 
     depth: NDArray
@@ -77,6 +78,7 @@ class DepthView(Value):
     T_world_sensor: NDArray = field(default_factory=lambda: np.eye(4))
     noise: float = 0.0015
     outline_error: float = 0.004
+    rim_px: float = 0.5
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "depth", frozen_array(self.depth))

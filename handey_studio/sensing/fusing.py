@@ -52,7 +52,14 @@ def fuse_readings(area: ScanArea, points_range: NDArray, viewpoints: tuple[NDArr
         passed=passing_heights(elevation, area.cell, starts, np.concatenate(ends) if ends else starts),
         noise=area.noise / np.sqrt(readings),
         outline_error=area.cell,
+        rim_px=rim_of(readings),
     )
+
+
+def rim_of(readings: float) -> float:
+    """How far [px] an outline lies outside the middles of its outermost cells, each with so many `readings`: half of their spacing,
+    for the outermost reading lies by chance within one spacing of the outline, and anywhere in its cell."""
+    return 0.5 / float(np.sqrt(max(readings, 1.0)))
 
 
 def inside(area: ScanArea, points_range: NDArray) -> NDArray:

@@ -12,7 +12,7 @@ from handey_studio.base import BadInput
 from handey_studio.base.files import replace_file
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.sensing.depth_view import DepthView, Pinhole
-from handey_studio.sensing.fusing import ScanArea, elevations
+from handey_studio.sensing.fusing import ScanArea, elevations, rim_of
 from handey_studio.sensing.instrument import Instrument
 from handey_studio.sensing.scan import Scan, with_area
 
@@ -42,7 +42,7 @@ def scan_view(scan: Scan, instrument: Instrument) -> DepthView:
     grid, readings = elevations(area, nearness[inside])
     focal = depth / sized.cell
     view = Pinhole(focal, focal, float(-low[0]), float(-low[1]))
-    return DepthView(-grid, view, instrument.T_world_range @ T_range_sensor, scan.noise / np.sqrt(readings), sized.cell)
+    return DepthView(-grid, view, instrument.T_world_range @ T_range_sensor, scan.noise / np.sqrt(readings), sized.cell, rim_of(readings))
 
 
 def write_cloud(path: Path, points_world: NDArray) -> None:
