@@ -19,7 +19,8 @@ from handey_studio.task import (
     plan_in,
     sense,
 )
-from handey_studio.world import Library
+from handey_studio.task.remembering import known_after
+from handey_studio.world import Library, PlacedPart
 
 SENSED, PLANNED = 0.25, 0.6  # how much of a whole MOVE's progress is behind when it is sensed, and when it is planned
 
@@ -59,7 +60,7 @@ def is_planned(session: Session) -> bool:
 def _sensed_and_planned(session: Session, station: Station, cell: SimulatedCell, progress: ShowingProgress) -> Session:
     command = session.commands[-1]
     try:
-        scene = sense(station, cell, session.seed, Share(progress, 0.0, SENSED))
+        scene = sense(station, cell, session.seed, Share(progress, 0.0, SENSED), known_of(session))
     except CannotAct as error:
         return replace(session, scene=None, results=(MoveResult(command, "failed", str(error)),))
     session = replace(session, scene=scene, results=())
@@ -77,6 +78,16 @@ def _executed(session: Session, station: Station, cell: SimulatedCell, progress:
     order = Order(station, planned.command, move_options(session), recovery_options(session))
     outcome = carry_out(order, session.scene, planned, cell, Share(progress, PLANNED, 1.0))
     return replace(session, scene=outcome.scene, results=(outcome.result,), cell_now=cell.setup_now())
+
+
+def known_of(session: Session) -> tuple[PlacedPart, ...]:
+    """Where the parts are by all that the session saw and did: what the last scene told, and what its last result put elsewhere."""
+    result = session.results[-1] if session.results else None
+    if session.scene is None:
+        return ()
+    if result is None or result.plan is None or result.performance is None:
+        return session.scene.instances
+    return known_after(session.scene, result.plan.part, result.T_world_part_reached)
 
 
 def move_options(session: Session) -> MoveOptions:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from handey_studio.base import Share
 from handey_studio.cell.protocol import Cell
 from handey_studio.cell.simulated import SimulatedCell
-from handey_studio.session.run import ShowingProgress, cell_of, move_options, recovery_options, station_of
+from handey_studio.session.run import ShowingProgress, cell_of, known_of, move_options, recovery_options, station_of
 from handey_studio.session.session import CommandState, Session
 from handey_studio.task import Outcome, Scene, Station, check_command, run_move
 from handey_studio.task.destination import base_name
@@ -79,7 +79,8 @@ def run_list(
 def _one(session: Session, number: int, station: Station, cell: Cell, scene: Scene | None, progress: Share) -> Outcome:
     """One command; the scene that was seen after the one before serves, if nothing moved since."""
     options, recovery = replace(move_options(session), settled=_settled(session, number)), recovery_options(session)
-    return run_move(station, cell, session.commands[number], options, progress=progress, recovery=recovery, scene=scene)
+    known = known_of(session)
+    return run_move(station, cell, session.commands[number], options, progress=progress, recovery=recovery, scene=scene, known=known)
 
 
 def _settled(session: Session, number: int) -> tuple[tuple[str, float, float, float], ...]:

@@ -14,6 +14,7 @@ from handey_studio.task.performance import Incident, Performance
 from handey_studio.task.plan import MovePlan
 from handey_studio.task.planning import Station, sense
 from handey_studio.task.recover import RecoveryOptions, felt_block
+from handey_studio.task.remembering import known_after, remembered
 from handey_studio.task.sense import Scene, believed_world
 from handey_studio.task.way_back import CameBack, come_back
 from handey_studio.world import Block, PlacedPart, World
@@ -49,22 +50,24 @@ def attempt(
     incident = performer.perform(Share(progress, 0.0, ACTED))
     if incident is not None:
         return _brought_back(performer, incident, progress)
-    return _looked_at(station, plan, performer.told(), cell, options, seed, Share(progress, ACTED, 1.0))
+    return _looked_at(station, scene, plan, performer.told(), cell, options, seed, Share(progress, ACTED, 1.0))
 
 
 def _looked_at(
-    station: Station, plan: MovePlan, done: Performance, cell: Cell, options: RecoveryOptions, seed: int, progress: Progress
+    station: Station, scene: Scene, plan: MovePlan, done: Performance, cell: Cell, options: RecoveryOptions, seed: int, progress: Progress
 ) -> Tried:
-    """The check: where the part stands now, by a new scan."""
+    """The check: where the part stands now, by a new scan. What comes of it is known in the scenes to come."""
     try:
-        after = sense(station, cell, seed, progress)
+        seen = sense(station, cell, seed, progress)
     except CannotAct as error:
         refused = Incident("refused", len(plan.steps), str(error))
         return Tried(replace(done, incidents=(*done.incidents, refused)), refused, q=cell.joints())
     part, released = station.models[plan.part.split("#")[0]], done.T_world_part_released
-    check = check_place(after, part, plan.T_world_part_goal, plan.T_world_part_goal if released is None else released)
+    check = check_place(seen, part, plan.T_world_part_goal, plan.T_world_part_goal if released is None else released)
     incident = wrong_place(check, options.place, len(plan.steps))
     incidents = done.incidents if incident is None else (*done.incidents, incident)
+    reached = check.T_world_part if check.T_world_part is not None else released if incident is None else None
+    after = remembered(seen, known_after(scene, plan.part, reached))
     return Tried(replace(done, check=check, incidents=incidents), incident, q=cell.joints(), seen=after.depth_map, after=after)
 
 

@@ -99,7 +99,7 @@ def _anew(order: Order, scene: Scene, attempts: list[Attempt], tried: Tried, cel
     for look in range(order.recovery.looks):
         seed = order.options.seed + len(attempts) + look
         try:
-            seen = _seen(order.station, tried if look == 0 else Tried(), cell, seed, progress)
+            seen = _seen(order.station, scene, tried if look == 0 else Tried(), cell, seed, progress)
         except CannotAct as error:
             return seen, replace(planned, reason=str(error))
         planned = _planned(order, seen, _same(scene, seen, attempts[-1]), attempts, cell, seed, progress)
@@ -108,11 +108,12 @@ def _anew(order: Order, scene: Scene, attempts: list[Attempt], tried: Tried, cel
     return seen, planned
 
 
-def _seen(station: Station, tried: Tried, cell: Cell, seed: int, progress: Progress) -> Scene:
-    """What the last scan of an attempt shows, or a new one."""
+def _seen(station: Station, before: Scene, tried: Tried, cell: Cell, seed: int, progress: Progress) -> Scene:
+    """What the last scan of an attempt shows, or a new one: nobody knows where things are but by the scene before."""
     if tried.after is not None:
         return tried.after
-    return understood(station, tried.seen, seed, progress) if tried.seen is not None else sense(station, cell, seed, progress)
+    known = before.instances
+    return understood(station, tried.seen, seed, progress, known) if tried.seen is not None else sense(station, cell, seed, progress, known)
 
 
 def _planned(order: Order, seen: Scene, part: str | None, attempts: list[Attempt], cell: Cell, seed: int, progress: Progress) -> MoveResult:

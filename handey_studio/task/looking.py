@@ -90,10 +90,15 @@ def readings_of(depth_map: DepthMap, part: Part, T_world_part: NDArray) -> tuple
     view = depth_map.view()
     corners = apply(inverse(view.T_world_sensor) @ T_world_part, part.solid.vertices)
     depth = rendered_depth(corners, part.solid.triangles, view.depth.shape, camera_of(view.projection))
-    inner: Any = ndimage.binary_erosion(np.isfinite(depth), iterations=SILHOUETTE_CELLS + 1)
-    above: NDArray = (depth - view.depth)[inner]
+    above: NDArray = (depth - view.depth)[inner(depth)]
     above = above[np.isfinite(above)]
     return int((np.abs(above) < AGREE_M).sum()), len(above), int((above < -CHANGE_M).sum())
+
+
+def inner(depth: NDArray) -> NDArray:
+    """Where (H, W) a drawn part is met well inside its silhouette."""
+    eroded: Any = ndimage.binary_erosion(np.isfinite(depth), iterations=SILHOUETTE_CELLS + 1)
+    return eroded
 
 
 def _told(part: Part, T: NDArray, rivals: tuple[tuple[str, NDArray], ...], T_world_goal: NDArray) -> Check:

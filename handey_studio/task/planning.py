@@ -14,8 +14,9 @@ from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.task.carrying import Start
 from handey_studio.task.move import MoveOptions, check_command, plan_move
 from handey_studio.task.plan import MoveCommand, MoveResult
+from handey_studio.task.remembering import remembered
 from handey_studio.task.sense import Scene, believed_world, understand
-from handey_studio.world import Block, Part, Robot
+from handey_studio.world import Block, Part, PlacedPart, Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,22 +32,26 @@ class Station(Value):
         return {part.name: part for part in self.parts}
 
 
-def sense(station: Station, cell: Cell, seed: int = 0, progress: Progress = Silent()) -> Scene:
-    """Scan the cell and find the station's parts."""
+def sense(
+    station: Station, cell: Cell, seed: int = 0, progress: Progress = Silent(), known: tuple[PlacedPart, ...] = ()
+) -> Scene:  # fmt: skip
+    """Scan the cell and find the station's parts; what was `known` of them before helps where the scan alone cannot tell."""
     _check_parts(station)
     progress.report(0.0, "scanning")
     begun = time.perf_counter()
     depth_map = cell.scan()
     scanned = time.perf_counter() - begun
-    scene = understood(station, depth_map, seed, Share(progress, 0.3, 1.0))
+    scene = understood(station, depth_map, seed, Share(progress, 0.3, 1.0), known)
     return replace(scene, timing_s={"scan": scanned} | scene.timing_s)
 
 
-def understood(station: Station, depth_map: DepthMap, seed: int = 0, progress: Progress = Silent()) -> Scene:
-    """Find the station's parts in a scan that was taken."""
+def understood(
+    station: Station, depth_map: DepthMap, seed: int = 0, progress: Progress = Silent(), known: tuple[PlacedPart, ...] = ()
+) -> Scene:
+    """Find the station's parts in a scan that was taken, with what was `known` before it."""
     _check_parts(station)
     options = LocateOptions(table_z_m=station.workcell.table_z)
-    return understand(depth_map, station.parts, np.random.default_rng(seed), options, progress)
+    return remembered(understand(depth_map, station.parts, np.random.default_rng(seed), options, progress), known)
 
 
 def plan_in(

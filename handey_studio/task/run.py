@@ -10,6 +10,7 @@ from handey_studio.task.plan import MoveCommand, MoveResult
 from handey_studio.task.planning import Station, plan_in, sense
 from handey_studio.task.recover import RecoveryOptions
 from handey_studio.task.sense import Scene
+from handey_studio.world import PlacedPart
 
 SENSED, PLANNED = 0.1, 0.4  # how much of a whole MOVE's progress is behind when it is sensed, and when it is planned
 
@@ -36,14 +37,18 @@ def run_move(
     progress: Progress = Silent(),
     recovery: RecoveryOptions = RecoveryOptions(),
     scene: Scene | None = None,
+    known: tuple[PlacedPart, ...] = (),
 ) -> Outcome:
     """Sense (unless a scene is given that was sensed before), plan and, if wanted, execute one MOVE. Bad input raises; everything else is a
-    result. What is to be executed and cannot be planned is looked at once more, by another scan."""
+    result. What is to be executed and cannot be planned is looked at once more, by another scan. `known` are parts that were seen or put
+    down before, for where a scan alone cannot tell."""
+    known = scene.instances if scene is not None else known
     check_command(command, station.models)
     result = MoveResult(command, "failed", "")
     for look in range(recovery.looks if execute_too else 1):
         try:
-            scene = scene if scene is not None and look == 0 else sense(station, cell, options.seed + look, Share(progress, 0.0, SENSED))
+            if scene is None or look > 0:
+                scene = sense(station, cell, options.seed + look, Share(progress, 0.0, SENSED), known)
         except CannotAct as error:
             return Outcome(replace(result, reason=str(error)), None)
         if progress.cancelled:

@@ -16,17 +16,22 @@ from handey_studio.world import Part, PlacedPart, Robot, World
 
 @dataclass(frozen=True, eq=False)
 class Scene(Value):
-    """What was sensed: the depth map, the localizer's record, and the instances it found (`l_block#1`, …, best first)."""
+    """What was sensed: the depth map, the localizer's record, and the instances it found (`l_block#1`, …, best first).
+
+    Behind them stand those that it did not find but that were known before and that the readings bear out; `known` names these, and
+    those of the others that could be otherwise by this view alone.
+    """
 
     depth_map: DepthMap
     located: LocateResult
     instances: tuple[PlacedPart, ...]
     timing_s: dict[str, float] = field(default_factory=dict)
+    known: tuple[str, ...] = ()
 
     @property
     def doubts(self) -> dict[str, float]:
-        """For each instance how probable the likeliest other reading of it is, as a share of its own probability."""
-        poses = zip(self.instances, self.located.poses, strict=False)
+        """For each instance how probable the likeliest other reading of it is, as a share of its own probability, but for those known."""
+        poses = ((placed, pose) for placed, pose in zip(self.instances, self.located.poses, strict=False) if placed.name not in self.known)
         return {placed.name: max((r.probability for r in pose.rivals), default=0.0) / max(pose.score, 1e-9) for placed, pose in poses}
 
     def instance(self, name: str) -> PlacedPart | None:
