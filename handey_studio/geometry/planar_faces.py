@@ -65,7 +65,8 @@ def _regions(corners: NDArray, triangles: NDArray, owner: dict[tuple[int, int], 
     region = np.full(len(triangles), -1)
     for seed in np.argsort(-doubled, kind="stable"):
         if region[seed] < 0:
-            joins = (sliver | (np.linalg.norm(normals - normals[seed], axis=1) < COPLANAR_RAD)) & (region < 0)
+            off = np.abs((corners[triangles] - corners[triangles[seed, 0]]) @ normals[seed]).max(axis=1)
+            joins = (sliver & (off < SLIVER_M) | (np.linalg.norm(normals - normals[seed], axis=1) < COPLANAR_RAD)) & (region < 0)
             region[seed] = seed
             _grow(region, int(seed), beside, joins)
     return region

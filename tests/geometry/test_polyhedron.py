@@ -1,3 +1,4 @@
+import manifold3d
 import numpy as np
 import pytest
 import trimesh
@@ -152,3 +153,12 @@ def test_a_face_whose_corners_coincide_is_refused_in_a_sentence():
     corners = np.vstack([np.eye(3), np.eye(3)[:1]])
     with pytest.raises(BadInput, match="no area"):
         polyhedron_from_polygons(corners, [[0, 3, 1, 1]])
+
+
+def test_lips_of_a_micrometre_join_the_faces_in_whose_plane_they_lie():
+    cubes = [manifold3d.Manifold.cube((20.001, 20.001, 20), True).translate((20 * k, 0, 0)) for k in range(4)]
+    mesh = manifold3d.Manifold.batch_boolean(cubes, manifold3d.OpType.Add).to_mesh64()
+    solid = polyhedron_from_polygons(np.asarray(mesh.vert_properties)[:, :3] * 1e-3, np.asarray(mesh.tri_verts).tolist())
+    assert len(solid.faces) == 6
+    for normal, offset, face in zip(solid.normals, solid.offsets, solid.faces, strict=True):
+        assert np.abs(solid.vertices[list(face.outer)] @ normal - offset).max() < 2e-6

@@ -34,9 +34,7 @@ def hexagonal_rod(across_mm, height_mm):
 
 
 def tetromino(cells):
-    return solid(
-        manifold3d.Manifold.batch_boolean([manifold((20.001, 20.001, 20), (20 * x, 20 * y, 0)) for x, y in cells], manifold3d.OpType.Add)
-    )
+    return solid(manifold3d.Manifold.batch_boolean([manifold((20, 20, 20), (20 * x, 20 * y, 0)) for x, y in cells], manifold3d.OpType.Add))
 
 
 PYRAMID = polyhedron_from_polygons(
