@@ -2,10 +2,10 @@
 
 In the paper one box holds the wrist at the start, at the goal and in between, and the legs to it are planned apart. With a layer for each
 stretch, the wrist as it is at the start, turning, and as it is at the goal, one search finds all: from one layer to the next the arm goes
-where both are free. More layers make each box smaller.
+where both are free. More layers make each box smaller. Where the wrist turns at one place it needs no box: that place is proved by itself.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,13 +17,19 @@ from handey_studio.motion.query import Query
 from handey_studio.motion.regions import Regions, free_regions, region_distances
 from handey_studio.motion.wrist_box import WristBox
 
+ROOMY = 2  # so many cells all around are free as well where the wrist turns at one place: most others would fail
+
 
 @dataclass(frozen=True, eq=False)
 class Layers(Value):
-    """Spaces of one extent and the wrist boxes that they are for; each box's way begins where that of the layer before ends."""
+    """Spaces of one extent and the wrist boxes that they are for; each box's way begins where that of the layer before ends.
+
+    The cells of the layer `assumed`, if any, are free for the wrist at both ends of its way, but nobody has looked at what is between.
+    """
 
     boxes: tuple[WristBox, ...]
     spaces: tuple[ConfigurationSpace, ...]
+    assumed: int | None = None
 
     @cached_property
     def blocked(self) -> NDArray:
@@ -48,3 +54,27 @@ def layers_of(query: Query, ways: list[NDArray], step: float) -> Layers:
     extent = extent_around(query.world.robot, step, np.array([query.start, query.goal]))
     pairs = [configuration_space(query.free, way, extent) for way in ways]
     return Layers(tuple(box for _, box in pairs), tuple(space for space, _ in pairs))
+
+
+def turned_at_one_place(query: Query, way: NDArray, step: float) -> Layers:
+    """Three layers: the wrist as it is at the start of its way (m, joints − 3) [rad], turning, and as it is at the end.
+
+    The turning one is assumed to be free in roomy places: cells that are free for both ends of the way, as all cells around them are.
+    """
+    ends = layers_of(query, [way[:1], way[-1:]], step)
+    crowded: NDArray = np.logical_or(*ends.blocked)
+    for axis in range(3):
+        crowded = _spread(crowded, axis)
+    boxes, spaces = ends.boxes, ends.spaces
+    turning = replace(boxes[0], wrists=way), replace(spaces[0], blocked=crowded)
+    return Layers((boxes[0], turning[0], boxes[1]), (spaces[0], turning[1], spaces[1]), 1)
+
+
+def _spread(blocked: NDArray, axis: int) -> NDArray:
+    """Cells (n1, n2, n3) that are blocked, and those up to `ROOMY` from them along an axis."""
+    out = blocked.copy()
+    here, there = np.moveaxis(blocked, axis, 0), np.moveaxis(out, axis, 0)
+    for shift in range(1, ROOMY + 1):
+        there[shift:] |= here[:-shift]
+        there[:-shift] |= here[shift:]
+    return out

@@ -1,7 +1,7 @@
 """Collision-free, certified paths between two configurations (Handey 1987 §4)."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from handey_studio.base import Ledger, Progress, Silent
 from handey_studio.motion.apart import surely_apart
 from handey_studio.motion.certificate import Mover, certify_with
-from handey_studio.motion.layers import layers_of
+from handey_studio.motion.layers import Layers, layers_of, turned_at_one_place
 from handey_studio.motion.query import PathOptions, Query, query
 from handey_studio.motion.random_trees import grow_trees
 from handey_studio.motion.results import CSpaceSummary, Leg, PathResult
 from handey_studio.motion.rounding import round_corners
 from handey_studio.motion.shortcut import Route, shorten
 from handey_studio.motion.three_legs import three_legs
-from handey_studio.motion.wrist_ways import held_stretches, wrist_ways
+from handey_studio.motion.wrist_ways import holds_far, wrist_parts, wrist_ways
 from handey_studio.world import Held, World
 from handey_studio.world.collision import Pairs
 from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, TABLE
@@ -85,27 +85,32 @@ def _none(asked: Query, reason: str, ledger: Ledger, space: CSpaceSummary | None
     fixed = {DEPTH_MAP, TABLE, OUTSIDE} | {thing.name for thing in (*world.blocks, *world.parts)}
     told = [entry.bodies for entry in ledger.entries] + [asked.free.obstacle(asked.start, asked.goal)]
     separating = tuple(name for name, _ in Counter(name for bodies in told for name in bodies if name in fixed).most_common())
-    nothing, cancelled = np.empty((0, len(asked.start))), reason == "cancelled"
+    cancelled = reason == "cancelled"
     return PathResult(
-        "none", reason, nothing, entries=ledger.entries, space=space, cancelled=cancelled, proven=proven, separating=separating
+        "none", reason, _nothing(asked), entries=ledger.entries, space=space, cancelled=cancelled, proven=proven, separating=separating
     )
 
 
 def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Iterator[Attempt]:
-    """What is tried, one after the other."""
-    nothing = np.empty((0, len(asked.start)))
+    """What is tried, one after the other, what is cheap first."""
     if asked.options.straight and asked.free.moves(asked.start, asked.goal):
         yield Attempt("straight", np.array([asked.start, asked.goal]), [asked.free], None, "")
     ways = wrist_ways(asked, rng, 2)
     if not ways:
-        yield Attempt("wrist", nothing, [], None, "the wrist finds no way to turn that keeps the hand off the arm")
-    plans = list(_plans(asked, ways))
-    for k, (needed, stretches, step) in enumerate(plans):
-        progress.report(k / (len(plans) + 1), f"configuration space of the arm joints, {step:g}° cells")
-        found = three_legs(asked, layers_of(asked, stretches, float(np.deg2rad(step))))
-        yield Attempt(needed, found.points, found.movers, found.space, found.reason, bodies=found.bodies)
-    if not asked.options.tree_growths:
-        return
+        yield Attempt("wrist", _nothing(asked), [], None, "the wrist finds no way to turn that keeps the hand off the arm")
+    steps = asked.options.steps_deg
+    for k, step in enumerate(steps):
+        for needed, layers in _plans(asked, ways, step):
+            progress.report(k / (len(steps) + 1), f"configuration space of the arm joints, {step:g}° cells")
+            found = three_legs(asked, layers(), rng, progress)
+            needed = ", ".join(word for word in (needed, found.more) if word)
+            yield Attempt(needed, found.points, found.movers, found.space, found.reason, bodies=found.bodies)
+    if asked.options.tree_growths:
+        yield from _trees(asked, rng, progress)
+
+
+def _trees(asked: Query, rng: np.random.Generator, progress: Progress) -> Iterator[Attempt]:
+    """Random trees; after a few growths, whether there can be a path at all."""
     few = min(FEW_GROWTHS, asked.options.tree_growths)
     for most in dict.fromkeys((few, asked.options.tree_growths)):
         points, movers, grown = grow_trees(asked, most, rng, progress)
@@ -113,30 +118,33 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
         yield Attempt(f"random trees, {grown} growths", points, movers, None, why)
         if most == few and not len(points) and surely_apart(asked):
             why = "start and goal stay apart even where only what is wholly blocked is taken out"
-            yield Attempt("proof", nothing, [], None, why, proven=True)
+            yield Attempt("proof", _nothing(asked), [], None, why, proven=True)
             return
 
 
-def _plans(asked: Query, ways: list[tuple[str, NDArray]]) -> Iterator[tuple[str, list[NDArray], float]]:
-    """What is needed, the wrist's way by layers, and the cells' width [°], in the order of their cost.
+def _plans(asked: Query, ways: list[tuple[str, NDArray]], step: float) -> Iterator[tuple[str, Callable[[], Layers]]]:
+    """What is needed and the layers, with cells `step` [°] wide, in the order of their cost.
 
-    The paper's one box; layers for the wrist as it is at both ends, which take in what one box gives; another way of the wrist; finer
-    cells. A held joint that turns far moves the arm itself: a layer for each stretch of its turn. So many layers of fine cells would take
-    longer than random trees do, so they have the widest cells only.
+    The paper's one box; the wrist turned at one place, for which the layers of the ends must be built; and for all ways the tighter boxes
+    of parts of the range. A held joint that turns moves the arm itself, so it turns at one place.
     """
-    robot, coarse = asked.world.robot, asked.options.steps_deg[0]
-    for step in asked.options.steps_deg:
-        for name, way in ways:
-            stretches, words = held_stretches(robot, way), [name, f"{step:g}° cells" if step != coarse else ""]
-            if len(stretches) > 1 and step != coarse:
-                continue
-            if len(stretches) == 1 and step == coarse and not name:
-                yield "", [way], step
-            layers = "layers for the ends"
-            if len(stretches) > 1:
-                layers = f"{robot.holding(np.array([asked.start, asked.goal]))} in {len(stretches)} layers"
-            words.append(layers)
-            yield ", ".join(word for word in words if word), [way[:1], *stretches, way[-1:]], step
+    robot, coarse, width = asked.world.robot, asked.options.steps_deg[0], float(np.deg2rad(step))
+    fine = "" if step == coarse else f"{step:g}° cells, "
+    held = robot.holding(np.array([asked.start, asked.goal])) if any(holds_far(robot, way) for _, way in ways) else ""
+    for name, way in ways:
+        if not name and not fine and not held:
+            yield "", lambda way=way: layers_of(asked, [way], width)
+    for name, way in ways:
+        words = f"{name}, " if name else ""
+        yield f"{words}{fine}{held or 'the wrist turned'} at one place", lambda way=way: turned_at_one_place(asked, way, width)
+    for name, way in ways if not held else ():
+        words, parts = f"{name}, " if name else "", wrist_parts(way)
+        words += f"{fine}a tighter wrist box for each of {len(parts)} parts of its way"
+        yield words, lambda stretches=(way[:1], *parts, way[-1:]): layers_of(asked, list(stretches), width)
+
+
+def _nothing(asked: Query) -> NDArray:
+    return np.empty((0, len(asked.start)))
 
 
 def _finished(

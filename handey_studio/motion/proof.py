@@ -27,6 +27,7 @@ from handey_studio.world.collision_queries import (
 
 PROVED, VIOLATED, UNDECIDED = 0, 1, 2
 MAX_HALVINGS = 24  # one part in 16 million of a segment: distances there are constant to a nanometre
+MEASURED = 5  # halvings down to which all distances are measured: from there on only what is not proved yet can be much nearer
 
 
 class Motion(NamedTuple):
@@ -184,7 +185,8 @@ def _settle(
 def prove(chain: Chain, shapes: Shapes, scene: Scene, motion: Motion, margin: float, nearest: float) -> Verdict:
     """Whether every checked pair stays at least `margin` [m] apart on the whole segment, and as far beside it as its slack.
 
-    `nearest` [m]: distances below it are measured and the least returned with its place, if any; 0 to measure none.
+    `nearest` [m]: distances below it are measured, and the least returned with its place, if any; 0 to measure none. They are those of all
+    pairs in coarse steps, and in finer ones of those pairs that come so near that coarse ones do not prove them.
     """
     bodies, pairs = len(shapes.link), len(shapes.pairs)
     dq = np.abs(motion.end - motion.start)
@@ -207,7 +209,7 @@ def prove(chain: Chain, shapes: Shapes, scene: Scene, motion: Motion, margin: fl
         boxes, spans = _boxes(shapes, poses, opening)
         placed[:] = False
         checks += 1
-        if best.distance > 0.0:
+        if best.distance > 0.0 and halvings[depth] <= MEASURED:
             for b in range(bodies):
                 _place(shapes, poses, opening, b, corners, placed)
             hit = least_clearance(shapes, corners, scene, best.distance)
@@ -218,6 +220,8 @@ def prove(chain: Chain, shapes: Shapes, scene: Scene, motion: Motion, margin: fl
         left, hit = _settle(shapes, scene, place, spans, reach, margin, open_bodies[depth], open_pairs[depth])
         if not left:
             continue
+        if hit.distance < best.distance:
+            best, best_at = hit, t
         if hit.distance < margin:
             return Verdict(VIOLATED, t, hit, checks)
         if halvings[depth] == MAX_HALVINGS - 1:

@@ -19,14 +19,16 @@ class PathOptions:
     `margin_m` what free motion keeps from everything; nearer an end that is closer already, half of that end's clearance.
     `straight` whether the straight way is looked at before a space is built.
     `steps_deg` widths of the cells, tried in turn; each divides a turn. `regions` free regions tried a space,
-    `repairs` searches after the whole arm failed in some cells, `shortcuts` random short cuts tried,
-    `tree_growths` extensions of the random trees, the last resort, before which a proof of none is sought; 0 for neither.
+    `repairs` searches after the whole arm failed in some cells, `leg_growths` extensions of the random trees that look for a way of more
+    legs from an end to the free space, `shortcuts` random short cuts tried, `tree_growths` extensions of the random trees over all joints,
+    the last resort, before which a proof of none is sought; 0 for neither.
     """
 
     margin_m: float = MARGIN_M
     steps_deg: tuple[float, ...] = (5.0, 2.5)
     regions: int = 2
-    repairs: int = 8
+    repairs: int = 20
+    leg_growths: int = 300
     straight: bool = True
     shortcuts: int = 40
     tree_growths: int = 20_000

@@ -8,19 +8,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.base import Progress, Silent
 from handey_studio.motion.certificate import Mover
 from handey_studio.motion.layers import Layers
-from handey_studio.motion.legs import leg_to_free
+from handey_studio.motion.legs import End, leg_to_free, legs_to_free
 from handey_studio.motion.query import Query
 from handey_studio.motion.regions import nearest_cells, region_distances
 from handey_studio.motion.results import CSpaceSummary
 from handey_studio.motion.search import find_cells
 
+NO_PLACE = 2  # cells around one in which the wrist does not turn at one place, where it hardly does either
+
 
 @dataclass(frozen=True, eq=False)
 class ThreeLegs:
     """What one stack of spaces gave: the path's points (n, joints) [rad] and the mover of each segment, empty when none; `reason` why, and
-    the `bodies` in the way.
+    the `bodies` in the way. `more` tells at which ends more than one leg was needed.
     """
 
     points: NDArray
@@ -28,39 +31,45 @@ class ThreeLegs:
     reason: str
     space: CSpaceSummary
     bodies: tuple[str, ...] = ()
+    more: str = ""
 
 
-def three_legs(query: Query, layers: Layers) -> ThreeLegs:
-    """The three legs in a stack of spaces."""
+def three_legs(query: Query, layers: Layers, rng: np.random.Generator | None = None, progress: Progress | None = None) -> ThreeLegs:
+    """The three legs in a stack of spaces; with a generator more than one at an end that no straight one leaves."""
     regions = layers.common_regions(query.start, query.goal, query.options.regions)
     reason, bodies = ("", ()) if regions else apart(query, layers)
+    ends = End("start", query.start, query.leaving, 0), End("goal", query.goal, query.arriving, len(layers.spaces) - 1)
     for region in regions:
-        first = leg_to_free(query.leaving, layers, 0, query.start, region)
-        last = leg_to_free(query.arriving, layers, len(layers.spaces) - 1, query.goal, region) if first else None
-        if first is None or last is None:
-            if not reason:
-                reason, bodies = _unreached(query, layers, region, first is None)
+        legs, more = [], []
+        for end in ends:
+            leg = leg_to_free(end, layers, region)
+            if leg is None and rng is not None and query.options.leg_growths:
+                leg = legs_to_free(query, end, layers, region, rng, progress or Silent())
+                more.append(f"more legs at the {end.name}")
+            if leg is None:
+                reason, bodies = (reason, bodies) if reason else _unreached(end, layers, region)
+                break
+            legs.append(leg)
+        if len(legs) < len(ends):
             continue
-        between, cells = _free_leg(query, layers, first[1], last[1])
+        first, last = legs
+        between, cells = _free_leg(query, layers, first.cell, last.cell)
         if not len(between):
             reason = reason or "the whole arm fails in the cells that its model with the wrist box calls free"
             continue
-        points = np.concatenate([first[0], between[1:], last[0][::-1][1:]])
-        movers = [query.leaving, *[query.free] * (len(between) - 1), query.arriving]
-        return ThreeLegs(points, movers, "", summary(layers, cells))
+        points = np.concatenate([first.points, between[1:], last.points[::-1][1:]])
+        movers = [*first.movers, *[query.free] * (len(between) - 1), *last.movers[::-1]]
+        return ThreeLegs(points, movers, "", summary(layers, cells), more=", ".join(more))
     return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(layers, np.empty((0, 4))), bodies)
 
 
-def _unreached(query: Query, layers: Layers, region: int, at_start: bool) -> tuple[str, tuple[str, ...]]:
-    """Why no straight leg joins an end to a region, and the bodies in the way to its nearest cell."""
-    name, q, mover, layer = (
-        ("start", query.start, query.leaving, 0) if at_start else ("goal", query.goal, query.arriving, len(layers.spaces) - 1)
-    )
-    space = layers.spaces[layer]
-    cell = nearest_cells(layers.regions, layer, space.place(q), region, 1)[0]
-    bodies = mover.obstacle(q, space.at(cell, q))
+def _unreached(end: End, layers: Layers, region: int) -> tuple[str, tuple[str, ...]]:
+    """Why no leg joins an end to a region, and the bodies in the way to its nearest cell."""
+    space = layers.spaces[end.layer]
+    cell = nearest_cells(layers.regions, end.layer, space.place(end.q), region, 1)[0]
+    bodies = end.mover.obstacle(end.q, space.at(cell, end.q))
     between = f": {' and '.join(bodies)} are in the way" if bodies else ""
-    return f"the {name} does not reach the free cells nearest to it{between}", bodies
+    return f"the {end.name} does not reach the free cells nearest to it{between}", bodies
 
 
 def apart(query: Query, layers: Layers) -> tuple[str, tuple[str, ...]]:
@@ -84,7 +93,8 @@ def apart(query: Query, layers: Layers) -> tuple[str, tuple[str, ...]]:
 def _free_leg(query: Query, layers: Layers, first: NDArray, last: NDArray) -> tuple[NDArray, NDArray]:
     """Points (n, joints) of the free leg, proved for the whole arm, and its cells (k, 4); both empty when there is none.
 
-    The cells answer for the scene. Where the arm's own bodies come too close the cells are taken out and the way is searched anew.
+    The cells answer for the scene. Where the arm's own bodies come too close the cells are taken out and the way is searched anew; of
+    the layer that is assumed to be free, the cells around them too.
     """
     blocked = layers.blocked
     for _ in range(query.options.repairs):
@@ -105,7 +115,10 @@ def _free_leg(query: Query, layers: Layers, first: NDArray, last: NDArray) -> tu
         if not out:
             break
         blocked = np.array(blocked)
-        blocked[tuple(np.array(list(out)).T)] = True
+        for layer, i, j, m in out:
+            wide = NO_PLACE if layer == layers.assumed else 0
+            here = tuple(slice(max(k - wide, 0), k + wide + 1) for k in (i, j, m))
+            blocked[layer][here] = True
     return np.empty((0, len(query.start))), np.empty((0, 4))
 
 

@@ -4,8 +4,6 @@ The paper interpolates; where that makes the wrist or the hand pass through the 
 arm joints helps, and the wrist goes by way of another posture.
 """
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,16 +46,16 @@ def wrist_ways(query: Query, rng: np.random.Generator, most: int) -> list[tuple[
     return ways
 
 
-def held_stretches(robot: Robot, way: NDArray) -> list[NDArray]:
-    """A way (m, joints − 3) [rad] in stretches in which no held joint turns by more than `HELD_RAD`; one, where none turns so far."""
+def holds_far(robot: Robot, way: NDArray) -> bool:
+    """Whether a held joint turns by more than `HELD_RAD` on a way (m, joints − 3) [rad]."""
     held = np.isin(robot.other_index, robot.held_index)
-    if np.ptp(way[:, held], axis=0).max(initial=0.0) <= HELD_RAD:
-        return [way]
-    points = [way[0]]
-    for a, b in pairwise(way):
-        parts = max(1, int(np.ceil(np.abs(b - a)[held].max() / HELD_RAD)))
-        points += [a + (b - a) * (k / parts) for k in range(1, parts + 1)]
-    return [np.array(pair) for pair in pairwise(points)]
+    return bool(np.ptp(way[:, held], axis=0).max(initial=0.0) > HELD_RAD)
+
+
+def wrist_parts(way: NDArray) -> list[NDArray]:
+    """A way (2 or 3, joints − 3) [rad] in two parts (2, joints − 3): at its corner, or else in its middle."""
+    middle = way[1] if len(way) > 2 else way.mean(axis=0)
+    return [np.array([way[0], middle]), np.array([middle, way[-1]])]
 
 
 def wrist_turns(mover: Mover, start: NDArray, end: NDArray) -> bool:

@@ -1,13 +1,11 @@
 """Arm motion for arms that are not a UR5: the held joint of seven, and the Puma; judged by the independent oracle."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from handey_studio.motion import PathOptions, plan_path, straight_path
-from handey_studio.motion.wrist_ways import held_stretches
 from handey_studio.world import Library, World, arm_of
 from handey_studio.world.collision import collision_model
 from tests.motion.oracle import DOWN, Judge, scene
@@ -42,23 +40,13 @@ def test_paths_are_found_and_the_judge_finds_no_collision(name):
         assert judge.first_meeting(found.q_rad, 0.02) is None
 
 
-def test_a_held_joint_that_turns_far_is_planned_in_layers_and_told():
+def test_a_held_joint_that_turns_far_does_so_at_one_place_and_it_is_told():
     world, rng = world_of("panda"), np.random.default_rng(7)
     ends = [next(reaches(world, rng, np.deg2rad([held]))) for held in (0.0, 35.0)]
-    found = plan_path(world, *ends, OPENING, options=PathOptions(straight=False))
+    found = plan_path(world, *ends, OPENING, options=PathOptions(straight=False, shortcuts=0))
     assert found.found
-    assert "panda_joint3 turned from 0° to 35° in 3 layers" in found.needed
+    assert "panda_joint3 turned from 0° to 35° at one place" in found.needed
     assert Judge(world, OPENING).first_meeting(found.q_rad, 0.01) is None
-
-
-def test_a_way_of_a_held_joint_is_cut_into_stretches():
-    robot = LIBRARY.robot("panda")
-    way = np.array([[0.0, 0.1, 0.2, 0.3], [0.5, 0.9, 0.2, 0.4], [0.6, 1.0, 0.2, 0.4]])
-    stretches = held_stretches(robot, way)
-    assert all(abs(part[1, 0] - part[0, 0]) <= np.deg2rad(12.0) + 1e-9 for part in stretches)
-    assert (stretches[0][0] == way[0]).all() and (stretches[-1][-1] == way[-1]).all()
-    assert all((a[-1] == b[0]).all() for a, b in pairwise(stretches))
-    assert len(held_stretches(LIBRARY.robot("ur5"), way[:, 1:])) == 1
 
 
 @pytest.mark.parametrize("name", ["panda", "xarm7"])
