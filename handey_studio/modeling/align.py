@@ -131,11 +131,16 @@ def _refined(T: NDArray, shared: Shared) -> tuple[NDArray, Pairs]:
         if independent(pairs, shared.model) < 3:
             break
         rows, values = [], []
+        faces = [(a, b) for a, b in pairs if "rim" not in (shared.model[a].kind, shared.new[b].kind)]
+        turned = independent(faces, shared.model) > 1  # then faces tell how it is turned, and rims only where it is
         for a, b in pairs:
             points, plane = apply(T, shared.points[b]), shared.model[a]
+            if turned and (a, b) not in faces:
+                points = points.mean(axis=0, keepdims=True)
             sigma = float(np.hypot(plane.sigma, shared.new[b].sigma)) + CERTAIN_M
             weight = float(np.sqrt(max(shared.new[b].size, CERTAIN_M) / len(points))) / sigma
-            rows.append(weight * np.concatenate([np.cross(points, plane.normal), np.tile(plane.normal, (len(points), 1))], axis=1))
+            lever = np.cross(points, plane.normal) * (len(points) > 1)
+            rows.append(weight * np.concatenate([lever, np.tile(plane.normal, (len(points), 1))], axis=1))
             values.append(weight * (plane.offset - points @ plane.normal))
         step = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0]
         T = transform(Rotation.from_rotvec(step[:3]).as_matrix(), step[3:]) @ T

@@ -222,6 +222,9 @@ def squared(clue: Clue, frame: NDArray, ring: NDArray) -> tuple[Clue, Squared | 
 
 
 def _levelled(clue: Clue, normal: NDArray, ring: NDArray) -> Clue:
+    if clue.kind == "rim":  # a rim that was turned is as unsure as its ends have moved
+        turned = float(np.arccos(np.clip(clue.normal @ normal, -1.0, 1.0)))
+        return clue._replace(normal=normal, sigma=float(np.hypot(clue.sigma, turned * clue.size / np.sqrt(12.0))))
     if clue.kind != "seen" or normal @ UP < 1.0 - LEVEL**2:
         return clue._replace(normal=normal)
     corners = ring - ((ring - clue.point) @ clue.normal)[:, None] * clue.normal

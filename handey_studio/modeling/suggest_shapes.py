@@ -15,7 +15,8 @@ from handey_studio.geometry.transforms import apply, transform
 from handey_studio.modeling.suggest_planes import UP, Body, BodyPlane, Clue
 
 ALONG = np.cos(np.deg2rad(1.0))  # planes along an axis
-ROUGHLY_ALONG = np.cos(np.deg2rad(20.0))  # ragged rims, where nothing better is known
+ROUGHLY_ALONG, RAGGEDLY_ALONG = np.cos(np.deg2rad(20.0)), np.cos(np.deg2rad(40.0))  # ragged rims, where nothing better is known
+SAME_END_M = 0.015
 OUTER_PART = 0.3  # of their length tells where they end
 NEAR_END_M = 0.02
 LEAST_THICK_M = 0.002
@@ -24,6 +25,7 @@ SEEN_WORTH = 3.0  # a face that is seen tells three times as much as a rim of th
 INTO_M = 0.001  # columns reach into higher ones beside them
 NEAR_STEP_M = 0.006  # so near to where a higher face hides the lower one its side goes down
 MOST_ENDS = 3
+MOSTLY = 0.5
 LEAST_APART_M = 0.0003  # corners of an outline
 EXACT_DIGITS = 7  # a ten thousandth of a millimetre
 
@@ -67,12 +69,13 @@ def cuboids(clues: Sequence[Clue], planes: Sequence[BodyPlane], frame: NDArray) 
     ends = []
     for direction in np.concatenate([frame, -frame]):
         along = sorted((plane for plane in planes if plane.normal @ direction > ALONG), key=_worth, reverse=True)
-        found = [plane.offset for plane in along[: MOST_ENDS if direction @ UP < -ALONG else 1]]
-        found = found or _rough_end(clues, direction)
-        if not found:
+        found = [plane.offset for plane in (_below(along)[:MOST_ENDS] if direction @ UP < -ALONG else along[:1])]
+        if not found or along[0].kind == "rim":
+            found = _rough_end(clues, direction, along[0].size if along else 0.0) or found
+        hidden = _hidden(clues, direction, found[0] if found else -np.inf)
+        if not found and hidden <= 0:
             yield Shape("cuboid", None, f"nothing shows where it ends along {_named(direction)}")
             return
-        hidden = _hidden(clues, direction, found[0])
         if hidden > 0 and not any(plane.kind != "rim" for plane in along):
             yield Shape("cuboid", None, f"a nearer thing hides where it ends along {_named(direction)}", hidden, 0.0, "m")
             return
@@ -81,14 +84,22 @@ def cuboids(clues: Sequence[Clue], planes: Sequence[BodyPlane], frame: NDArray) 
         yield _cuboid(np.array(chosen[:3]), np.array(chosen[3:]), frame)
 
 
-def _rough_end(clues: Sequence[Clue], direction: NDArray) -> list[float]:
-    """Where ragged rims that look roughly that way end: the mean of the outer part of them; empty if there are none."""
-    rims = [(float(c.point @ direction), c.size * float(c.normal @ direction)) for c in clues if c.kind == "rim" and c.side[0] == 0]
-    rims = sorted((offset, size) for offset, size in rims if size > 0)[::-1]
-    offsets, sizes = np.array(rims).reshape(-1, 2).T
-    roughly = [c for c in clues if c.kind == "rim" and c.normal @ direction > ROUGHLY_ALONG]
-    if not roughly:
+def _below(along: Sequence[BodyPlane]) -> list[BodyPlane]:
+    """The planes where an object may end below, without rims beside what it may stand on: they are the same end, less sharp."""
+    supports = [plane.offset for plane in along if plane.kind == "support"]
+    return [p for p in along if p.kind != "rim" or all(abs(p.offset - offset) > SAME_END_M for offset in supports)]
+
+
+def _rough_end(clues: Sequence[Clue], direction: NDArray, sure: float) -> list[float]:
+    """Where rims that look roughly that way end: the mean of the outer part of them; empty if there are none, or if more than their half
+    is `sure` [m] long, on one plane."""
+    rims = [c for c in clues if c.kind == "rim" and c.side[0] == 0 and c.normal @ direction > RAGGEDLY_ALONG]
+    sizes = np.array([c.size * float(c.normal @ direction) for c in rims])
+    if not rims or sure >= MOSTLY * sizes.sum():
         return []
+    offsets = np.array([float(c.point @ direction) for c in rims])
+    order = np.argsort(-offsets)
+    offsets, sizes = offsets[order], sizes[order]
     outer = np.cumsum(sizes) - sizes < OUTER_PART * sizes.sum()
     return [float(np.average(offsets[outer], weights=sizes[outer]))]
 

@@ -19,7 +19,7 @@ class DepthMap(Value):
 
     Cell (j, i) covers x in [i, i + 1)·cell and y in [j, j + 1)·cell of the range frame. `passed` (ny, nx) [m] is the lowest height
     above each cell that light on its way to a reading, or from it to a camera, went through: the space above it is empty. It is the
-    elevation itself where there is one, and `SKY_M` where no such light passed. `noise`, `outline_error` [m] and `rim_px` as in `DepthView`.
+    elevation itself where there is one, and `SKY_M` where no such light passed. The rest as in `DepthView`.
     """
 
     elevation: NDArray
