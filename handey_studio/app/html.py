@@ -6,7 +6,7 @@ from html import escape
 from handey_studio.app import palette
 from handey_studio.app.palette import css
 
-TONES = {"info": palette.BLUE, "good": palette.TEAL, "bad": palette.VERMILLION, "quiet": palette.GREY}
+TONES = {"info": palette.BLUE, "good": palette.TEAL, "bad": palette.VERMILLION, "warn": palette.ORANGE, "quiet": palette.GREY}
 
 
 def esc(text: object) -> str:
@@ -61,11 +61,10 @@ def swatch(colour: palette.RGB, label: str) -> str:
 def count_row(label: str, count: int, most: int, colour: palette.RGB) -> str:
     """A label, a bar as long as its count's share of the most, and the count."""
     width = max(3.0, 100.0 * count / max(most, 1))
-    clipped = "flex:0 0 62%;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     bar = f'<div style="width:{width:.0f}%;background:{css(colour)};height:8px;border-radius:3px"></div>'
     return (
         '<div style="display:flex;align-items:center;gap:8px;margin:2px 0">'
-        f'<div style="{clipped}" title="{esc(label)}">{esc(label)}</div>'
+        f'<div style="flex:0 0 62%;line-height:1.25">{esc(label)}</div>'
         f'<div style="flex:1;background:#e6eaef;border-radius:3px">{bar}</div>'
         f'<div style="flex:0 0 48px;text-align:right;font-variant-numeric:tabular-nums">{count}</div></div>'
     )

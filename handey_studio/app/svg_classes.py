@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handey_studio.app import html, palette
 from handey_studio.app.palette import RGB, css
@@ -39,6 +40,12 @@ def classes_html(told: Handling, entries: Mapping[str, Entry], chosen: str, look
     return f'<div data-testid="classes" style="margin:2px 14px 6px;font-size:12px;line-height:1.45">{inner}</div>'
 
 
+def class_view(part: Part, grasp_class: GraspClass, T_world_part: NDArray) -> PlaneView:
+    """A view of the grasp plane that the whole part and the arrows around it are in."""
+    middle = grasp_class.T_part_plane[:3, 1:3].T @ (part.solid.vertices.mean(axis=0) - grasp_class.T_part_plane[:3, 3])
+    return PlaneView(T_world_part @ grasp_class.T_part_plane, middle, part.solid.diameter + 1.6 * ARROW_M, SIZE)
+
+
 def class_svg(part: Part, grasp_class: GraspClass, groups: Sequence[tuple[GraspGroup, str]], view: PlaneView) -> str:
     """The part seen along the closing direction, where the fingers touch, and an arrow for each approach that crosses an edge somewhere."""
     shapes = [part_in_plane(part, grasp_class.T_part_plane, view)]
@@ -62,9 +69,7 @@ def class_svg(part: Part, grasp_class: GraspClass, groups: Sequence[tuple[GraspG
 def _card(told: Handling, number: int, place: int, entries: Mapping[str, Entry], chosen: str, looked_at: bool, picker: str) -> str:
     grasp_class, numbers = told.classes[number], told.groups_of(number)
     groups = [(told.groups[g], fate_of(told.groups[g], entries, chosen)) for g in numbers]
-    T_world_plane = told.T_world_part @ grasp_class.T_part_plane
-    middle = grasp_class.T_part_plane[:3, 1:3].T @ (told.part.solid.vertices.mean(axis=0) - grasp_class.T_part_plane[:3, 3])
-    view = PlaneView(T_world_plane, middle, told.part.solid.diameter + 1.6 * ARROW_M, SIZE)
+    view = class_view(told.part, grasp_class, told.T_world_part)
     counts = {fate: sum(f == fate for _, f in groups) for fate in ORDER}
     said = ", ".join(f"{counts[fate]} {fate}" for fate in ORDER if counts[fate]) if entries else f"{len(groups)} approach groups"
     seen = "seen from above or below" if view.level else "up is up"

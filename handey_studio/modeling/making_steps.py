@@ -40,7 +40,8 @@ class TakeSuggestion(Operation):
 
     @property
     def told(self) -> str:
-        return f"{self.kind} with {len(self.faces)} faces"
+        suggested = any(source.startswith(("seen", "assumed")) for source in self.sources)
+        return f"{self.kind if suggested else 'take shape'} with {len(self.faces)} faces"
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.distances import Surface, signed_distances, surface_of
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.modeling.checks import solid_checks
+from handey_studio.modeling.doubts import doubts
 from handey_studio.modeling.object_readings import Readings, object_readings
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.truth_values import ScanTruth, Truth
@@ -61,7 +62,8 @@ def truth(
     distances = np.concatenate([each.distances for each in told]) if told else np.empty(0)
     explained = sum(each.explained * len(each.distances) for each in told) / max(1, len(distances))
     checks = solid_checks(solid, density)
-    return Truth(tuple(told), _rms(distances, options.reach_m), explained, float(faces_seen @ areas / areas.sum()), faces_seen, checks)
+    seen_share = float(faces_seen @ areas / areas.sum())
+    return Truth(tuple(told), _rms(distances, options.reach_m), explained, seen_share, faces_seen, checks, doubts(told, explained))
 
 
 def surface_spots(solid: Polyhedron, count: int) -> tuple[NDArray, NDArray, NDArray]:

@@ -12,7 +12,8 @@ from handey_studio.base import Value, frozen_array
 class Check(Value):
     """One thing that a part must be. `sentence` tells what was found, `fix` what would help (empty when all is well).
 
-    `name`: "closed", "planar", "outlines", "one body", "crossing", "thin", "sliver", "size", "volume", "mass" or "centre of mass".
+    `name`: "closed", "planar", "outlines", "one body", "crossing", "thin", "sliver", "size", "volume", "mass" or "centre of mass"; of
+    doubts "explained" or "seen through".
     `faces` are the numbers of the faces that it is about, `where` (n, 3) [m] points in the model frame that show it.
     """
 
@@ -60,7 +61,7 @@ class Truth(Value):
     """The model against all its scans. `rms` [m] of all readings, `explained` the share of them within 3 noises of the surface.
 
     `seen`: the share of the model's surface that readings lie on, in any scan; `faces_seen` (m,) the same for each face.
-    `checks` are those of `solid_checks`. Without a reading `rms` is NaN and `explained` 0.
+    `checks` are those of `solid_checks`, `doubts` what the scans say against the model. Without a reading `rms` is NaN and `explained` 0.
     """
 
     scans: tuple[ScanTruth, ...]
@@ -69,11 +70,17 @@ class Truth(Value):
     seen: float
     faces_seen: NDArray
     checks: tuple[Check, ...]
+    doubts: tuple[Check, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "faces_seen", frozen_array(self.faces_seen))
 
     @property
     def ok(self) -> bool:
-        """Whether every check holds."""
+        """Whether every check holds: it can be a part. It may be a wrong one, see `doubts`."""
         return all(check.ok for check in self.checks)
+
+    @property
+    def findings(self) -> tuple[Check, ...]:
+        """All checks and then the doubts, as they are numbered on screen."""
+        return (*self.checks, *self.doubts)

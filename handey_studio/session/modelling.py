@@ -10,6 +10,7 @@ from handey_studio.cell.turning import turned_over
 from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import rotation_about
 from handey_studio.modeling.draft import Draft
+from handey_studio.modeling.operations import TakeSuggestion
 from handey_studio.modeling.replay import Built
 from handey_studio.modeling.scans import scan_of_map
 from handey_studio.modeling.truth_values import Truth
@@ -70,11 +71,17 @@ def part_of(solid: Polyhedron, name: str, density: float, friction: float, prove
 def provenance_of(draft: Draft, built: Built, judged: Truth | None) -> Provenance:
     """Where a model came from, as its part remembers it."""
     scans = tuple(scan.name for scan in draft.scans)
-    source = f"modelled from {len(scans)} scan{'s' if len(scans) != 1 else ''}" if scans else "modelled by hand"
+    source = f"modelled from {len(scans)} scan{'s' if len(scans) != 1 else ''}" if scans else _made_from(draft)
     assumed = assumed_faces(built.sources)
     if judged is None or not scans:
         return Provenance(source, scans, assumed_faces=assumed)
     return Provenance(source, scans, judged.rms, judged.explained, judged.seen, assumed)
+
+
+def _made_from(draft: Draft) -> str:
+    """Where a model without scans began: in a file that was imported, else nowhere."""
+    taken = [step.sources[0] for step in draft.operations if isinstance(step, TakeSuggestion)]
+    return next((source for source in taken if source.startswith("imported")), "modelled by hand")
 
 
 def with_part(session: Session, part: Part) -> Session:

@@ -23,6 +23,14 @@ USUAL_M = (0.008, 1.0)  # how large across parts that a hand takes are
 TRIED_M = (0.0002, 0.0005, 0.001, 0.002)  # tolerances that are tried to say what would help
 
 
+class Simplifiable(BadInput):
+    """A mesh that is too rough as it is; within `tolerance` [m] it would be a part."""
+
+    def __init__(self, sentence: str, tolerance: float) -> None:
+        super().__init__(sentence)
+        self.tolerance = tolerance
+
+
 @dataclass(frozen=True)
 class ImportOptions:
     """`unit`: that of the file's numbers, one of m, cm, mm, in; STEP files tell their own. `simplify_m` [m]: planes so near are made one.
@@ -60,6 +68,8 @@ def import_part(path: str | os.PathLike, options: ImportOptions) -> Imported:
         found = _bodies(corners, triangles)
         triangles = _chosen(corners, found, options.body)
         solid, deviation = _solid(corners, triangles, options.simplify_m)
+    except Simplifiable as error:
+        raise Simplifiable(f'"{path}" cannot be imported: {error}', error.tolerance) from None
     except BadInput as error:
         raise BadInput(f'"{path}" cannot be imported: {error}') from None
     told = f"imported from {path.name}" + (f", simplified within {measured(options.simplify_m, 'm')}" if options.simplify_m else "")
@@ -136,26 +146,27 @@ def _solid(corners: NDArray, triangles: NDArray, tolerance: float | None) -> tup
         made = simplified(*_compact(corners, triangles), tolerance)
         return made.solid, made.deviation
     if len(triangles) > MAX_TRIANGLES:
-        raise BadInput(f"it has {len(triangles)} triangles, the limit is {MAX_TRIANGLES}: {_what_helps(corners, triangles)}.")
+        raise _what_helps(corners, triangles, f"it has {len(triangles)} triangles, the limit is {MAX_TRIANGLES}")
     solid = polyhedron_from_polygons(corners, triangles.tolist())
     if len(solid.faces) > MOST_FACES:
-        faces = len(solid.faces)
-        raise BadInput(f"it has {faces} planar faces, the limit is {MOST_FACES}; {_what_helps(corners, triangles)}.")
+        raise _what_helps(corners, triangles, f"it has {len(solid.faces)} planar faces, the limit is {MOST_FACES}")
     return solid, 0.0
 
 
-def _what_helps(corners: NDArray, triangles: NDArray) -> str:
-    """The least of some tolerances within which a mesh becomes a polyhedron, in words."""
+def _what_helps(corners: NDArray, triangles: NDArray, wrong: str) -> BadInput:
+    """What is wrong with a mesh, and the least of some tolerances within which it becomes a polyhedron."""
     corners, triangles = _compact(corners, triangles)
     if len(triangles) > MOST_SIMPLIFIED:
-        return "thin the mesh out, then it may be simplified"
+        return BadInput(f"{wrong}; thin the mesh out, then it may be simplified.")
     for tolerance in TRIED_M:
         try:
             made = simplified(corners, triangles, tolerance)
         except BadInput:
             continue
-        return f"simplified within {1e3 * tolerance:g} mm it would have {len(made.solid.faces)} faces"
-    return f"it is round, or too rough to be simplified within {1e3 * TRIED_M[-1]:g} mm: only shapes with flat faces can be parts"
+        helps = f"it would have {len(made.solid.faces)} faces, at most {measured(made.deviation, 'm')} off"
+        return Simplifiable(f"{wrong}; simplified within {1e3 * tolerance:g} mm {helps}.", tolerance)
+    rough = f"it is round, or too rough to be simplified within {1e3 * TRIED_M[-1]:g} mm: only shapes with flat faces can be parts"
+    return BadInput(f"{wrong}; {rough}.")
 
 
 def _compact(corners: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray]:

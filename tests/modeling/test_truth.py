@@ -21,7 +21,7 @@ HERE = (np.eye(4), np.eye(4))
 def test_a_right_model_is_explained_by_its_noise_and_nothing_denies_it():
     told = truth(L, SCANS, HERE)
     assert (
-        told.ok and told.explained > 0.97 and 0.5 * NOISE < told.rms < 1.1 * NOISE
+        told.ok and not told.doubts and told.explained > 0.97 and 0.5 * NOISE < told.rms < 1.1 * NOISE
     )  # noise is along the sight, distances across the faces
     for each in told.scans:
         assert abs(each.distances.mean()) < 0.1 * NOISE and each.seen_through == 0.0 and len(each.points) > 3000
@@ -49,13 +49,17 @@ def test_a_model_too_low_or_too_high_shows_by_so_much(off):
     for each in told.scans:
         on_top = (each.faces == top) & (np.abs(each.distances) > 0.001)
         assert np.median(each.distances[on_top]) == pytest.approx(off, abs=2e-4)  # + in front of the surface
-    assert told.explained < 0.8
+    assert told.explained < 0.8 and told.ok
+    doubt = told.doubts[0]
+    assert doubt.name == "explained" and doubt.faces == (top,) and ("in front of" if off > 0 else "behind") in doubt.sentence
+    assert ("outward" if off > 0 else "inward") in doubt.fix and f"{100 * told.explained:.0f} %" in doubt.sentence
 
 
 def test_a_model_that_is_too_large_was_seen_through_and_the_depth_is_told():
     large = prism([[0, 0], [0.08, 0], [0.08, 0.07], [0, 0.07]], 0.04)  # fills the L's notch
     told = truth(large, SCANS, HERE)
     right = told.scans[1]
+    assert "seen through" in {doubt.name for doubt in told.doubts}
     assert right.seen_through > 0.2 and 0.008 < right.seen_through_m < 0.025
     assert (right.through_points[:, :2] > 0.02).all() and len(right.through_points) > 10
     assert told.scans[0].name == "left"

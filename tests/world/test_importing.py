@@ -111,7 +111,7 @@ def test_the_deviation_is_that_of_the_farthest_corner():
 
 def test_a_rough_scan_is_refused_with_what_would_help(tmp_path):
     path = in_mm(rough(LIBRARY.part("l_block").solid, 0.004, 0.0002), tmp_path / "scan.stl")
-    with pytest.raises(BadInput, match=r"triangles, the limit is 5000: simplified within (1|2) mm it would have 8 faces"):
+    with pytest.raises(BadInput, match=r"triangles, the limit is 5000; simplified within (1|2) mm it would have 8 faces"):
         import_part(path, MM)
     coarse = in_mm(rough(LIBRARY.part("l_block").solid, 0.012, 0.0002), tmp_path / "coarse.stl")
     with pytest.raises(BadInput, match=r"planar faces, the limit is 200; simplified within (0.5|1|2) mm it would have 8 faces"):

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from handey_studio.app.actions import Bench, CancelMove
 from handey_studio.app.modelling import derived
+from handey_studio.app.modelling.importing import LeaveMesh
 from handey_studio.app.modelling.look import SELECT
 from handey_studio.app.modelling.steps import AcceptAlignment, TakeModel
 from handey_studio.app.modelling.tool_clicks import CUT, EXTRUDE, MIRROR, POINTS, SKETCH
@@ -39,6 +40,8 @@ class Escape:
         state = bench.state
         if state.job is not None:
             return CancelMove().run(bench)
+        if state.model.mesh is not None:
+            return LeaveMesh().apply(state)
         if not state.model.open:
             return state
         if state.model.trial is not None:

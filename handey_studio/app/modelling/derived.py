@@ -16,6 +16,7 @@ from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.snapping import Pickable
 from handey_studio.modeling.suggestion import Alignment, Suggestion
 from handey_studio.modeling.truth_values import Truth
+from handey_studio.session.graspable import Graspable
 from handey_studio.session.model_look import built_of, clickable, shown_poses, unaligned
 
 SUGGESTION, ALIGNMENT, TRUTH, GRASPS, TRIAL = "suggestion", "alignment", "truth", "grasps", "trial"
@@ -131,8 +132,8 @@ def to_grasp(state: State) -> tuple | None:
     return None if shown is None or shown.solid is None else (shown.solid, state.robot)
 
 
-def grasps(state: State) -> tuple[int, int] | None:
-    """How many grasp classes and approach groups the hand has for the solid."""
+def grasps(state: State) -> Graspable | None:
+    """What the hand can grasp of the solid, None while that is worked out."""
     return outcome(state, GRASPS, to_grasp(state))
 
 

@@ -1,7 +1,7 @@
 """What to do next with the model, said in one sentence for every state that it can be in; and what the active tool waits for."""
 
 from handey_studio.app.modelling import derived
-from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE
+from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE, MeshImport
 from handey_studio.app.modelling.plane_tools import measurement, tool_plane
 from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH
 from handey_studio.app.state import State
@@ -19,13 +19,16 @@ def model_step(state: State) -> tuple[str, str, str]:
         return f"{job.title or 'Planning'} …", job.message, "info"
     if state.model.reading is not None:
         return "Reading the scan …", f'"{state.model.reading.name}" is read, and the plane that the object stands on is looked for.', "info"
+    if state.model.mesh is not None:
+        return _about_mesh(state.model.mesh)
     if state.model.waiting is not None:
         wanted = "depth image (PNG)" if state.model.waiting.name.lower().endswith("json") else "camera (JSON)"
         return "One more file", f'Upload the {wanted} that belongs to "{state.model.waiting.name}".', "info"
     if draft is None and state.session.draft is not None:
         return f"The model of {state.session.draft.name}", "Continue it, or go on with a MOVE.", "quiet"
     if draft is None:
-        return "Model a part", "Scan the cell or upload a scan of an object: its faces are found, and a solid is suggested.", "info"
+        words = "Scan the cell or upload a scan of an object: its faces are found, and a solid is suggested. Or import a mesh."
+        return "Model a part", words, "info"
     if state.model.trial is not None:
         return _about_trial(state, state.model.trial)
     if state.model.tool != SELECT:
@@ -52,6 +55,15 @@ def _with_scans(state: State) -> tuple[str, str, str]:
     if state.model.step is not None:
         return f"As after step {state.model.step}", "Click the step again to see the whole model.", "quiet"
     return _about_solid(state)
+
+
+def _about_mesh(mesh: MeshImport) -> tuple[str, str, str]:
+    """What is asked of a file that is to be imported."""
+    if mesh.refusal:
+        return "Not a part as it is", mesh.refusal, "bad"
+    if mesh.upload.tells_unit or not mesh.extents:
+        return "Reading the mesh …", f'"{mesh.upload.name}": its triangles, its bodies, its planar faces.', "info"
+    return "In which unit are its numbers?", f'"{mesh.upload.name}" does not say. Choose the size that it has, then Import it.', "info"
 
 
 def _about_trial(state: State, scan: Scan) -> tuple[str, str, str]:
@@ -98,6 +110,8 @@ def _about_solid(state: State) -> tuple[str, str, str]:
     broken = next((check for check in judged.checks if not check.ok), None) if judged is not None else None
     if broken is not None:
         return "Not yet a part", f"{broken.sentence} {broken.fix}", "bad"
+    if judged is not None and judged.doubts:
+        return "The scans disagree", f"{judged.doubts[0].sentence} {judged.doubts[0].fix}", "warn"
     assumed = len(assumed_faces(shown.sources)) if shown is not None else 0
     if assumed:
         words = f"{assumed} side{'s are' if assumed > 1 else ' is'} assumed"

@@ -12,6 +12,7 @@ from handey_studio.modeling.references import FaceAt
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.sketching import Guides, Stroke
 from handey_studio.modeling.snap import Snap
+from handey_studio.session.mesh_files import MeshUpload
 from handey_studio.session.model_files import Upload
 
 SELECT = "select"
@@ -46,6 +47,18 @@ class Waiting:
 
     name: str
     content: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class MeshImport:
+    """A mesh file that is to become the model: its `extents` along x, y, z in its own numbers, empty until they are known, and the `unit`
+    that these make likely; why it was refused, and the `tolerance` [m] that would help, 0 where none is known."""
+
+    upload: MeshUpload
+    extents: tuple[float, ...] = ()
+    unit: str = "mm"
+    refusal: str = ""
+    tolerance: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +100,7 @@ class ModelLook:
     unit: str = "m"  # of clouds that are uploaded
     waiting: Waiting | None = None
     reading: Upload | None = None
+    mesh: MeshImport | None = None
     trial: Scan | None = None  # the scan in which the model is looked for
     part: str = ""  # the part of the library that is pointed at
     saves: int = 0  # how often a part was kept, so that the library is read again

@@ -36,8 +36,8 @@ class PointAtCheck:
         number = -1 if state.model.check == self.number else self.number
         state = replace(state, model=replace(state.model, check=number))
         judged = derived.truth(state)
-        if judged is not None and 0 <= number < len(judged.checks) and len(judged.checks[number].where):
-            look_at(bench, judged.checks[number].where, self.client)
+        if judged is not None and 0 <= number < len(judged.findings) and len(judged.findings[number].where):
+            look_at(bench, judged.findings[number].where, self.client)
         return state
 
 

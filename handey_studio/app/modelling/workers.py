@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from handey_studio.app.background import Background
 from handey_studio.app.modelling import derived
+from handey_studio.app.modelling.importing import MeshMeasured, MeshRead
 from handey_studio.app.modelling.look import Worked
 from handey_studio.app.modelling.scanning import ScanRead
 from handey_studio.app.modelling.showing import look_at_object
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron
-from handey_studio.grasping import grasp_classes, grasp_groups
 from handey_studio.localization import LocateResult, localize
 from handey_studio.modeling import sightlines, suggest_warm_up
 from handey_studio.modeling.align import align
@@ -26,8 +26,10 @@ from handey_studio.modeling.suggest import suggest
 from handey_studio.modeling.suggestion import Alignment, Suggestion
 from handey_studio.modeling.truth import truth
 from handey_studio.modeling.truth_values import Truth
+from handey_studio.session.graspable import graspable
+from handey_studio.session.mesh_files import extents_of_upload, part_of_upload
 from handey_studio.session.model_files import scan_of_upload
-from handey_studio.world import Part, Robot
+from handey_studio.world import Part
 
 KEPT_PATCHES = 24
 MODEL_NAME = "model"
@@ -119,10 +121,14 @@ def located(scan: Scan, solid: Polyhedron) -> LocateResult:
     return localize(scan.view, (Part(MODEL_NAME, solid),))
 
 
-def counted_grasps(solid: Polyhedron, robot: Robot) -> tuple[int, int]:
-    """How many grasp classes and approach groups a hand has for a solid."""
-    part = Part(MODEL_NAME, solid)
-    return len(grasp_classes(part, robot.hand)[0]), len(grasp_groups(part, robot.hand)[0])
+def _to_measure(state: State) -> tuple | None:
+    mesh = state.model.mesh
+    return None if mesh is None or mesh.extents or mesh.upload.tells_unit else (mesh.upload,)
+
+
+def _to_import(state: State) -> tuple | None:
+    mesh = state.model.mesh
+    return None if mesh is None or mesh.refusal or not mesh.upload.tells_unit else (mesh.upload,)
 
 
 def _to_read(state: State) -> tuple | None:
@@ -136,9 +142,11 @@ def _named(name: str, wanted: Callable[[State], tuple | None], work: Callable[..
 TASKS = (
     Task(derived.to_segment, patches_of, lambda asked, found: Segmented(Worked(asked, found))),
     Task(_to_read, scan_of_upload, lambda asked, said: ScanRead(asked[0], said)),
+    Task(_to_measure, extents_of_upload, lambda asked, said: MeshMeasured(asked[0], said)),
+    Task(_to_import, part_of_upload, lambda asked, said: MeshRead(asked[0], said)),
     _named(derived.ALIGNMENT, derived.to_align, aligned),
     _named(derived.SUGGESTION, derived.to_suggest, suggested),
     _named(derived.TRUTH, derived.to_judge, judged),
     _named(derived.TRIAL, derived.to_try, located),
-    _named(derived.GRASPS, derived.to_grasp, counted_grasps),
+    _named(derived.GRASPS, derived.to_grasp, graspable),
 )

@@ -11,17 +11,20 @@ from handey_studio.app.commands import Redo, Undo
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.accepting import Accept, accept_label
 from handey_studio.app.modelling.guidance import model_step
+from handey_studio.app.modelling.importing import UploadMesh
 from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE, TO_TABLE
 from handey_studio.app.modelling.scanning import SCAN_CELL, TURN_OVER, CloseModel, NewModel, OpenModel, SetUnit, StartExample, UploadScan
 from handey_studio.app.modelling.steps import ConfirmPicked, OtherAlignment
 from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MIRROR, POINTS, SKETCH
 from handey_studio.app.modelling.tools import ChooseTool, SetTool
 from handey_studio.app.modelling.typed import Typed, typed_options
+from handey_studio.app.panels.mesh import MeshPanel
 from handey_studio.app.panels.move import choose
 from handey_studio.app.panels.tools import TOOLS, toolbar
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, on_submit, on_upload, on_user, set_to
 from handey_studio.modeling.snap import MODEL
+from handey_studio.session.mesh_files import SUFFIXES
 from handey_studio.session.model_look import assumed_faces, proposals, unaligned
 
 NONE = -1
@@ -38,6 +41,7 @@ class ModelPanel:
         self._accept = gui.add_button("Accept", icon=viser.Icon.CHECK, color=palette.BLUE, visible=False, hint="Enter")
         self._other = gui.add_button("Another pose", icon=viser.Icon.REFRESH, color="gray", visible=False)
         self._cancel = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color=palette.VERMILLION, visible=False)
+        self._mesh = MeshPanel(gui, send)
         self._tools = gui.add_html("")
         self._tool: Any = gui.add_number("Tool picked", NONE, step=1)
         self._add_parameters(gui)
@@ -78,6 +82,13 @@ class ModelPanel:
                 hint="PNG with its camera (JSON), NPY, PLY, PCD",
             )
             self._unit: Any = gui.add_dropdown("Clouds in", ("m", "cm", "mm"))
+        self._import = gui.add_upload_button(
+            "Import a mesh",
+            icon=viser.Icon.FILE_IMPORT,
+            color="gray",
+            mime_type=",".join(SUFFIXES),
+            hint="OBJ, STL, PLY, OFF, STEP: it becomes the model",
+        )
         self._example = gui.add_button("Start from an example", icon=viser.Icon.SCHOOL, color="gray", hint="An object to model")
         self._open = gui.add_button("Continue the model", icon=viser.Icon.CUBE, color=palette.ARM_DARK, visible=False)
         self._close = gui.add_button("Back to MOVE", icon=viser.Icon.ROBOT, color="gray", visible=False)
@@ -110,6 +121,7 @@ class ModelPanel:
         on_submit(self._form, send, self._submitted)
         on_click(self._apply, send, lambda _: self._submitted())
         on_upload(self._upload, send, lambda event: UploadScan(event.target.value.name, event.target.value.content))
+        on_upload(self._import, send, lambda event: UploadMesh(event.target.value.name, event.target.value.content))
         on_user(self._unit, send, lambda event: SetUnit(event.target.value))
 
     def _what_chosen(self, event: Any) -> None:
@@ -123,6 +135,7 @@ class ModelPanel:
 
     def render(self, old: State | None, new: State) -> None:
         set_to(self._tool, value=NONE)
+        self._mesh.render(old, new)
         if old is not None and _looks(old) == _looks(new):
             return
         look, draft = new.model, derived.draft_of(new)
@@ -206,5 +219,5 @@ def _usable(state: State) -> tuple[str, ...]:
 def _looks(state: State) -> tuple:
     look = state.model
     tool = look.open, look.tool, look.clicks, look.drawing, look.picked, look.settings, look.step, look.alternative
-    under_way = look.worked, look.patches, look.reading, look.waiting, look.unit, look.trial
+    under_way = look.worked, look.patches, look.reading, look.waiting, look.unit, look.trial, look.mesh
     return (*map(id, tool), *map(id, under_way), id(state.session.draft), state.loads, state.job, state.undo, state.redo)

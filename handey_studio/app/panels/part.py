@@ -14,7 +14,7 @@ from handey_studio.app.modelling.parts import EditPart, FindIt, NameModel, PickP
 from handey_studio.app.modelling.scanning import UploadScan
 from handey_studio.app.modelling.showing import ColourBy, PointAtCheck
 from handey_studio.app.modelling.steps import EditStep, LookAtStep, RemoveStep
-from handey_studio.app.panels.part_html import checks_html, history_html, legend_html, library_html, numbers_html
+from handey_studio.app.panels.part_html import about_html, findings_html, grasps_html, history_html, legend_html, library_html, numbers_html
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, on_submit, on_upload, on_user, set_to
 from handey_studio.base import BadInput
@@ -26,11 +26,10 @@ from handey_studio.world.model_files import read_part
 log = logging.getLogger(__name__)
 
 NONE = -1
-NO_SOLID = "No solid yet. Take the model that is suggested, or draw one: this then shows how true it is, and makes a part of it."
 
 
 class PartPanel:
-    """Top to bottom: numbers, checks, history, the part, the library."""
+    """Top to bottom: numbers and grasps, checks, the part, its history, the library."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._parts: tuple[Part, ...] = ()
@@ -39,14 +38,14 @@ class PartPanel:
         self._colours: Any = gui.add_dropdown("Colour readings by", (BY_SCAN, BY_DISTANCE), visible=False)
         self._checks = gui.add_html("")
         self._check: Any = gui.add_number("Check picked", NONE, step=1)
-        with gui.add_folder("History", expand_by_default=True):
+        self._add_saving(gui)
+        with gui.add_folder("History", expand_by_default=True) as self._past:
             self._history = gui.add_html("")
             self._row: Any = gui.add_number("Step picked", NONE, step=1)
             with gui.add_form(None, visible=False) as self._form:
                 self._value: Any = gui.add_number("Its number (mm)", 0.0, step=0.1)
                 self._change = gui.add_button("Change the step", icon=viser.Icon.PENCIL, color=palette.ARM_DARK)
             self._remove = gui.add_button("Remove the step", icon=viser.Icon.TRASH, color="gray", visible=False)
-        self._add_saving(gui)
         self._add_library(gui)
         self._wire(send)
 
@@ -54,14 +53,15 @@ class PartPanel:
         with gui.add_folder("The part", expand_by_default=True, visible=False) as self._saving:
             with gui.add_form(None) as self._naming:
                 self._name: Any = gui.add_text("Part name", "part", hint="Enter sets it")
-            self._density: Any = gui.add_number("Density (kg/m³)", 700.0, min=1.0, max=25_000.0, step=10.0)
-            self._friction: Any = gui.add_number("Friction", 0.5, min=0.01, max=2.0, step=0.05)
-            self._replace = gui.add_checkbox("Replace the one of that name", False)
-            self._save = gui.add_button("Save the part", icon=viser.Icon.DEVICE_FLOPPY, color=palette.ARM_DARK)
             self._find = gui.add_button("Find it", icon=viser.Icon.SEARCH, color=palette.BLUE, hint="In the cell; then MOVE it")
+            self._save = gui.add_button("Save the part", icon=viser.Icon.DEVICE_FLOPPY, color=palette.ARM_DARK)
             self._trial = gui.add_upload_button(
                 "Find it in a scan", icon=viser.Icon.UPLOAD, color="gray", mime_type=".png,.json,.npy,.ply,.pcd"
             )
+            with gui.add_folder("Material, replacing", expand_by_default=False):
+                self._density: Any = gui.add_number("Density (kg/m³)", 700.0, min=1.0, max=25_000.0, step=10.0)
+                self._friction: Any = gui.add_number("Friction", 0.5, min=0.01, max=2.0, step=0.05)
+                self._replace = gui.add_checkbox("Overwrite one of that name", False)
 
     def _add_library(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Library", expand_by_default=True):
@@ -101,18 +101,17 @@ class PartPanel:
     def _show_part(self, state: State) -> None:
         shown, judged, draft = derived.built(state), derived.truth(state), derived.draft_of(state)
         solid = shown is not None and shown.solid is not None
-        set_to(self._numbers, content=numbers_html(state) if solid else html.empty(NO_SOLID, "part-empty"))
+        set_to(self._numbers, content=numbers_html(state) + grasps_html(derived.grasps(state)) if solid else about_html(state))
         set_to(self._colours, visible=judged is not None and bool(judged.scans), value=state.model.colours)
         legend = legend_html(judged) if state.model.colours == BY_DISTANCE else ""
         hidden = html.unseen([element_id(self._check)])
-        set_to(
-            self._checks, content=hidden + legend + checks_html(judged.checks if judged else (), state.model.check, element_id(self._check))
-        )
+        set_to(self._checks, content=hidden + legend + findings_html(judged, state.model.check, element_id(self._check)))
         steps = derived.steps(state)
         row = html.unseen([element_id(self._row)])
         set_to(self._history, content=row + history_html(steps, state.model.step, element_id(self._row)))
         self._show_step(draft.operations if draft is not None else (), state.model.step)
         set_to(self._saving, visible=solid)
+        set_to(self._past, visible=state.modelling)
         if draft is not None:
             set_to(self._name, value=draft.name)
         set_to(self._density, value=state.model.material.density)

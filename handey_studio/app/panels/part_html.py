@@ -9,33 +9,62 @@ from handey_studio.app.modelling import derived
 from handey_studio.app.palette import RESIDUAL, RESIDUAL_AT, css
 from handey_studio.app.scene.modelling.scans import distance_limit
 from handey_studio.app.state import State
+from handey_studio.app.svg_classes import OPEN, class_svg, class_view
 from handey_studio.app.svg_thumbnail import part_thumbnail
-from handey_studio.base import measured
+from handey_studio.base import describe, measured
 from handey_studio.geometry import Polyhedron
+from handey_studio.modeling.doubts import DOUBTS
 from handey_studio.modeling.replay import Step
 from handey_studio.modeling.truth_values import Check, Truth
+from handey_studio.session.graspable import Graspable
 from handey_studio.session.model_look import assumed_faces
 from handey_studio.world import Part
 
 TOLD_THROUGH = 0.005
+MOST_GRASPS = 6
+NO_MODEL = (
+    "No model yet. Model, on the left, makes one of a scan or of a mesh file. "
+    "Parts of the library are below: edit one, or find it in the cell."
+)
+NO_SOLID = "No solid yet. Take the model that is suggested, or draw one: this then shows how true it is, and makes a part of it."
 CARD = "cursor:pointer;border:1px solid;border-radius:6px;padding:4px"
 CLIPPED = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
 
 
 def numbers_html(state: State) -> str:
     """Size, volume, mass, centre of mass, how well it agrees with the scans, what the hand can grasp of it."""
-    shown, judged, counted = derived.built(state), derived.truth(state), derived.grasps(state)
+    shown, judged, found = derived.built(state), derived.truth(state), derived.grasps(state)
     if shown is None or shown.solid is None:
         return ""
     rows = solid_facts(shown.solid, state.model.material.density)
     assumed = len(assumed_faces(shown.sources))
     rows.append(("Faces", f"{len(shown.solid.faces)}, {assumed} of them assumed" if assumed else f"{len(shown.solid.faces)}, none assumed"))
     rows += truth_facts(judged)
-    if counted is not None:
-        words = f"{counted[0]} grasp class{'es'[: 2 * (counted[0] != 1)]}, {counted[1]} approach group{'s'[: counted[1] != 1]}"
-        words = words if counted[0] else "nothing: no two faces fit between its fingers"
-        rows.append(("The hand can grasp", words))
+    if found is not None:
+        rows.append(("The hand can grasp", _grasp_words(found)))
     return html.facts(rows, "part-numbers")
+
+
+def _grasp_words(found: Graspable) -> str:
+    if found.classes:
+        classes, groups = len(found.classes), found.group_count
+        return f"{classes} grasp class{'es'[: 2 * (classes != 1)]}, {groups} approach group{'s'[: groups != 1]}"
+    miss = found.nearest_miss
+    return f"nothing: {describe(miss)}" if miss is not None else "nothing: no two features lie opposite one another"
+
+
+def about_html(state: State) -> str:
+    """What the pane says while it shows no solid: what became of the model, and what to do."""
+    draft = state.session.draft
+    if draft is None:
+        return html.empty(NO_MODEL, "part-empty")
+    if state.modelling:
+        return html.empty(NO_SOLID, "part-empty")
+    known = draft.name in state.session.workcell.parts
+    words = f'Its part "{draft.name}" is in the workcell; Move, on the left, has it. ' if known else ""
+    return html.card(
+        "The model is put aside", f"{words}Continue the model (left, Model) to look at it or change it.", "quiet", "part-aside"
+    )
 
 
 def solid_facts(solid: Polyhedron, density: float) -> list[tuple[str, str]]:
@@ -69,7 +98,7 @@ def truth_facts(judged: Truth | None) -> list[tuple[str, str]]:
         ("Explained", f"{100 * judged.explained:.0f} % of the readings, within 3 noises"),
         ("Surface seen", f"{100 * judged.seen:.0f} %"),
     ]
-    through = [scan for scan in judged.scans if scan.seen_through > 0.005]
+    through = [scan for scan in judged.scans if scan.seen_through > TOLD_THROUGH]
     rows += [
         (f"Seen through in {scan.name}", f"{100 * scan.seen_through:.0f} %, {1e3 * scan.seen_through_m:.1f} mm deep") for scan in through
     ]
@@ -85,22 +114,54 @@ def legend_html(judged: Truth | None) -> str:
     return html.scale("Readings' distance from the model (mm), behind to in front", stops, [f"−{limit:.1f}", "0", f"+{limit:.1f}"])
 
 
-def checks_html(checks: Sequence[Check], chosen: int, field: str) -> str:
-    """Each check with a tick, or a cross, its sentence and the fix; a click points at it in the scene."""
-    if not checks:
+def findings_html(judged: Truth | None, chosen: int, field: str) -> str:
+    """What is broken, and what the scans say against the model, each with its sentence and the fix; a click points at it in the scene."""
+    if judged is None:
         return ""
-    if all(check.ok for check in checks):
-        return html.card("A part", f"All {len(checks)} checks hold: closed, flat, one body, nowhere too thin.", "good", "checks")
-    rows = "".join(_check(number, check, number == chosen, field) for number, check in enumerate(checks) if not check.ok)
-    return f'<div data-testid="checks" style="margin:4px 12px;font-size:12px;line-height:1.35">{rows}</div>'
+    rows = "".join(_finding(number, check, number == chosen, field) for number, check in enumerate(judged.findings) if not check.ok)
+    listed = f'<div style="margin:4px 12px;font-size:12px;line-height:1.35">{rows}</div>' if rows else ""
+    return f'<div data-testid="checks">{_verdict(judged)}{listed}</div>'
 
 
-def _check(number: int, check: Check, chosen: bool, field: str) -> str:
-    look = f"background:{css(palette.VERMILLION)}1c" if chosen else ""
+def _verdict(judged: Truth) -> str:
+    broken = sum(not check.ok for check in judged.checks)
+    if broken:
+        return html.card("Not yet a part", f"{broken} of {len(judged.checks)} checks failed. Click one: the scene shows where.", "bad")
+    sound = f"All {len(judged.checks)} checks hold: closed, flat, one body, nowhere too thin."
+    if judged.doubts:
+        return html.card("A part, but not what was scanned", f"{sound} The scans speak against it; click to see where.", "warn")
+    return html.card("A part", sound, "good")
+
+
+def _finding(number: int, check: Check, chosen: bool, field: str) -> str:
+    colour = css(palette.ORANGE if check.name in DOUBTS else palette.VERMILLION)
+    look = f"background:{colour}1c" if chosen else ""
     return (
         f'<div role="button" tabindex="0" data-testid="check-{number}" onclick="{html.esc(html.picking(field, str(number)))}" '
-        f'style="cursor:pointer;border-left:3px solid {css(palette.VERMILLION)};padding:3px 8px;margin-bottom:2px;{look}">'
-        f'✕ {html.esc(check.sentence)} <span style="color:#6b7684">{html.esc(check.fix)}</span></div>'
+        f'style="cursor:pointer;border-left:3px solid {colour};padding:3px 8px;margin-bottom:2px;{look}">'
+        f'{html.esc(check.sentence)} <span style="color:#6b7684">{html.esc(check.fix)}</span></div>'
+    )
+
+
+def grasps_html(found: Graspable | None) -> str:
+    """The best grasp classes as small pictures: the part seen along the closing fingers, where they touch, and the ways in."""
+    if found is None or not found.classes:
+        return ""
+    cards = "".join(_grasp(found, place) for place in range(min(len(found.classes), MOST_GRASPS)))
+    left = len(found.classes) - MOST_GRASPS
+    more = f'<div style="color:#6b7684;font-size:11.5px">and {left} more; all are in Grasp once it is found</div>' if left > 0 else ""
+    grid = f'<div style="display:grid;grid-template-columns:repeat(3,1fr);gap:6px">{cards}</div>'
+    return f'<div data-testid="part-grasps" style="margin:4px 12px">{grid}{more}</div>'
+
+
+def _grasp(found: Graspable, place: int) -> str:
+    grasp_class, groups = found.classes[place]
+    view = class_view(found.part, grasp_class, np.eye(4))
+    picture = class_svg(found.part, grasp_class, [(group, OPEN) for group in groups], view)
+    words = f"{grasp_class.name}: {len(groups)} approach groups"
+    return (
+        f'<div title="{html.esc(words)}" style="border:1px solid #dde2e8;border-radius:6px;overflow:hidden">{picture}'
+        f'<div style="font-size:11px;text-align:center;padding:1px 3px 2px;{CLIPPED}">{html.esc(grasp_class.name)}</div></div>'
     )
 
 

@@ -85,7 +85,7 @@ def face_corners(solid: Polyhedron, faces: list[int]) -> NDArray:
 def _of_check(state: State) -> tuple[int, ...]:
     """The faces of the check that is pointed at."""
     judged = derived.truth(state)
-    return judged.checks[state.model.check].faces if judged is not None and 0 <= state.model.check < len(judged.checks) else ()
+    return judged.findings[state.model.check].faces if judged is not None and 0 <= state.model.check < len(judged.findings) else ()
 
 
 def _looks(state: State) -> tuple:
