@@ -15,6 +15,7 @@ SHARES = (0.5, 0.25, 0.75)  # where along the first edge, or along a grasped edg
 DEEPER_M = 0.008  # a second try enters this much deeper than the least penetration
 SPARE_AREA = 1.25  # the least penetration covers the least contact area this many times over
 SPARE_DEPTH_M = 0.003  # and reaches this far beyond where it first covers enough of an edge, or a vertex
+BELOW_M = 0.002  # what fingertips keep above what the part lies on
 LEAST_EDGE_M = 0.001  # shorter pieces of an outline are no edges to cross
 DEPTH_STEP_M = 0.001
 
@@ -77,10 +78,8 @@ def _groups_of_edge(grasp_class: GraspClass, hand: Hand, number: int, edge: NDAr
     groups = []
     for share in _shares(grasp_class, hand, edge, length):
         entry_point = edge[0] + share * along
-        least = _least_depth(grasp_class, hand, entry_point, inward, angle)
-        if least is not None:
-            depths = (least, least + DEEPER_M) if least + DEEPER_M < hand.finger_length else (least,)
-            groups += [GraspGroup(grasp_class, number, edge, entry_point + d * inward, angle, share, d) for d in depths]
+        depths = _depths(grasp_class, hand, entry_point, inward, angle)
+        groups += [GraspGroup(grasp_class, number, edge, entry_point + d * inward, angle, share, d) for d in depths]
     return groups
 
 
@@ -96,14 +95,20 @@ def _shares(grasp_class: GraspClass, hand: Hand, edge: NDArray, length: float) -
     return tuple(dict.fromkeys(float(s) for s in np.round(along, 6) if 0.0 < s < 1.0))
 
 
-def _least_depth(grasp_class: GraspClass, hand: Hand, entry: NDArray, inward: NDArray, angle: float) -> float | None:
-    """The least penetration [m], in whole millimetres, that covers the least contact area with some to spare."""
+def _depths(grasp_class: GraspClass, hand: Hand, entry: NDArray, inward: NDArray, angle: float) -> list[float]:
+    """How far [m] beyond an edge the fingertips go, in whole millimetres; nothing if they find too little contact there.
+
+    The least penetration that covers the least contact area with some to spare, and one that is deeper. Two faces that end about there may
+    lie on something, so of these also the least that covers it at all.
+    """
     depths = np.arange(1, round(hand.finger_length / DEPTH_STEP_M)) * DEPTH_STEP_M
     areas = contact_areas(grasp_class, hand, entry + depths[:, None] * inward, np.full(len(depths), angle))
-    enough = np.nonzero(areas >= SPARE_AREA * hand.min_contact_area)[0]
-    if not len(enough):
-        return None
-    return float(depths[enough[0]]) + (0.0 if grasp_class.kind == "faces" else SPARE_DEPTH_M)
+    barely, enough = depths[areas >= hand.min_contact_area], depths[areas >= SPARE_AREA * hand.min_contact_area]
+    faces, ends = grasp_class.kind == "faces", depths[np.argmax(areas >= areas.max() - 1e-12)]
+    thin = faces and (not len(enough) or ends < enough[0] + BELOW_M)
+    shallow = [float(depth) for depth in barely[:1] if thin and depth not in enough[:1]]
+    least = [float(depth) + (0.0 if faces else SPARE_DEPTH_M) for depth in enough[:1]]
+    return [*shallow, *least, *(depth + DEEPER_M for depth in least if depth + DEEPER_M < hand.finger_length)]
 
 
 def _outline_edges(polygon: shapely.Polygon) -> list[NDArray]:

@@ -145,13 +145,13 @@ def why_none(table: GraspPlacementTable, start: NDArray, goal: NDArray) -> str:
     from_start, to_goal = np.isfinite(start), np.isfinite(goal)
     for where, legal in (("start", from_start), ("goal", to_goal)):
         if not legal.any():
-            return f"no grasp of the table is legal at the {where}"
+            return f"none of the part's grasps is legal at the {where}"
         if not (table.legal & legal).any():
             return f"of the {legal.sum()} grasps that are legal at the {where} none is legal at any of {len(table.placements)} placements"
     reached, held = np.zeros(len(table.legal), dtype=bool), from_start
     while not (held & to_goal & table.legal.any(axis=0)).any():
         more = np.asarray((table.legal & held).any(axis=1))
         if (more == reached).all():
-            return f"the {reached.sum()} of {len(reached)} placements that the start's grasps lead to allow none of the goal's grasps"
+            return f"it comes to stand in {reached.sum()} of {len(reached)} ways, and none of them allows a grasp that is legal at the goal"
         reached, held = more, np.asarray((table.legal & more[:, None]).any(axis=0))
     return ""

@@ -1,20 +1,20 @@
 """MOVE object TO destination (Handey 1987 §2): from what was sensed to a full plan."""
 
 import time
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from handey_studio.base import Entry, Ledger, Progress, Silent, describe
+from handey_studio.base import Ledger, Progress, Silent
 from handey_studio.base.errors import unknown_name
 from handey_studio.task.areas import area_poses
 from handey_studio.task.carrying import Start
 from handey_studio.task.destination import Area, base_name, goal_poses, parse_destination
 from handey_studio.task.options import Goal, check_goal
 from handey_studio.task.plan import MoveCommand, MovePlan, MoveResult
+from handey_studio.task.reasons import EFFORT_SPENT, why_no_goal, why_no_plan
 from handey_studio.task.search import OptionSearch, SearchOptions, settle
 from handey_studio.world import Part, PlacedPart, World
 
@@ -58,13 +58,15 @@ def plan_move(
     ledger, timing = Ledger(), {}
     with _timed(timing, "destination"):
         goals = _goals(world, command, parts, ledger, doubts or {}, options)
-    plan, reason = None, "" if goals else _goal_reason(world, command, ledger)
+    plan, reason = None, ""
+    if not goals:
+        reason = why_no_goal(world, len(_candidates(world, command.part)), command.part, command.to, ledger.entries)
     if goals:
         search = OptionSearch(start, ledger, progress, np.random.default_rng(options.seed), options.search)
         with _timed(timing, "search"):
             plan = _best(search, goals, options.search.improve)
         _close(search, plan, ledger)
-        reason = "cancelled" if progress.cancelled and plan is None else _why_none(ledger.entries)
+        reason = "cancelled" if progress.cancelled and plan is None else why_no_plan(ledger.entries)
     shown = goals[0] if goals else None
     return MoveResult(
         command,
@@ -93,7 +95,7 @@ def _close(search: OptionSearch, plan: MovePlan | None, ledger: Ledger) -> None:
     waiting = search.waiting
     settle(ledger, {node.entry for node in waiting})
     if waiting:
-        why = "not looked at: there is a plan" if plan else "not looked at: the effort is spent"
+        why = "not looked at: there is a plan" if plan else EFFORT_SPENT
         ledger.add("options", f"{len(waiting)} more", why, value=search.spent, limit=search.options.effort, unit="s")
 
 
@@ -127,37 +129,6 @@ def _is_settled(placed: PlacedPart, options: MoveOptions) -> bool:
 
 def _candidates(world: World, name: str) -> list[PlacedPart]:
     return [placed for placed in world.parts if name in (placed.name, placed.part.name)]
-
-
-def _goal_reason(world: World, command: MoveCommand, ledger: Ledger) -> str:
-    """Why there is not even a goal, in a sentence."""
-    located = ", ".join(placed.name for placed in world.parts) or "nothing"
-    if not _candidates(world, command.part):
-        return f'"{command.part}" was not found in the scan; found: {located}'
-    fallen = [entry for entry in ledger.entries if entry.reason and entry.stage in ("destination", "area")]
-    if not fallen:
-        return f'nothing to put it on: "{command.to}" needs another part than the one that moves; found: {located}'
-    others = f"; {len(fallen) - 1} other readings of the command fell too" if len(fallen) > 1 else ""
-    return describe(fallen[0]) + others
-
-
-def _why_none(entries: tuple[Entry, ...]) -> str:
-    """Why no option was left: the commonest reasons, and whether a regrasp would be the way."""
-    groups = [entry for entry in entries if entry.stage == "grasp group" and entry.reason]
-    if not groups:
-        return "the hand cannot grasp this part: " + (describe(entries[-1]) if entries else "it has no pair of parallel faces")
-    counts = Counter(entry.reason for entry in groups)
-    said = "; ".join(f"{count} × {reason}" for reason, count in counts.most_common(3))
-    return f"none of {len(groups)} grasp groups works: {said}{_why_no_detour(entries)}"
-
-
-def _why_no_detour(entries: tuple[Entry, ...]) -> str:
-    """What became of putting the part down on the way."""
-    tried = sum(entry.stage == "placements" for entry in entries)
-    fallen = [entry.reason for entry in entries if entry.stage == "regrasp" and entry.reason]
-    if tried:
-        return f"; {tried} ways of putting it down and taking it anew did not help"
-    return f"; a regrasp does not help: {fallen[0]}" if fallen else ""
 
 
 @contextmanager
