@@ -8,7 +8,7 @@ import handey_studio
 
 ROOT = Path(handey_studio.__file__).parent
 FLOORS = (
-    {"base"},
+    {"base", "guide"},
     {"geometry"},
     {"world"},
     {"sensing"},

@@ -18,8 +18,16 @@ from handey_studio.session.run import station_of
 from handey_studio.task.calibrate import CalibrateOptions, RangeCalibration, calibrate_range
 from handey_studio.world import Library
 
-CALIBRATED = 1e-3  # what is less off, in metres or as a share of a right angle, was calibrated well
 MOST_OFF_M, MOST_TURN_RAD = 0.009, np.deg2rad(1.5)  # of a misplacement that is drawn by chance
+
+MISPLACED = (
+    f"The range finder was moved by up to {1e3 * MOST_OFF_M:.0f} mm along each axis and turned by up to {np.rad2deg(MOST_TURN_RAD):.1f}°. "
+    "MOVE to see what comes of it, then calibrate: that tells how far it was."
+)
+MISPLACED_HINT = "The simulated range finder is moved and turned by chance; by how much, calibrating tells"
+BACK = "The range finder stands where it is believed to stand again."
+ACCEPTED = "The range finder is believed to stand where the calibration found it. MOVE again to compare; the numbers are listed below."
+GONE = "What was scanned, planned and done before went with it."
 
 
 @dataclass(frozen=True)
@@ -58,7 +66,7 @@ class AcceptCalibration:
         if state.calibration is None or state.calibration.fit is None:
             raise BadInput("there is no calibration to accept; press Calibrate first.")
         session = calibrated(state.session, state.calibration.fit.T_world_range)
-        return replace(state.changed("calibrate the range finder", session), calibration=None, playing=False)
+        return replace(_moved(state, "calibrate the range finder", session, ACCEPTED), calibration=None)
 
 
 @dataclass(frozen=True)
@@ -77,15 +85,15 @@ class Misplace:
         check_idle(state)
         if not self.misplaced:
             session = with_finder_at(state.session, state.session.workcell.finder.T_world_range, np.eye(4))
-            return replace(state.changed("put the range finder back", session), playing=False)
+            return _moved(state, "put the range finder back", session, BACK)
         rng = np.random.default_rng()  # hidden from the user too: no seed tells it
         xyz = rng.uniform(0.3, 1.0, 3) * rng.choice([-1.0, 1.0], 3) * MOST_OFF_M
         yaw = rng.uniform(0.3, 1.0) * rng.choice([-1.0, 1.0]) * MOST_TURN_RAD
         session = misplaced(state.session, from_xyz_rpy(xyz, (0.0, 0.0, float(yaw))))
-        return replace(state.changed("misplace the range finder", session), playing=False)
+        return _moved(state, "misplace the range finder", session, MISPLACED)
 
 
-def is_misplaced(state: State) -> bool:
-    """Whether the simulated range finder was moved on purpose, and not yet calibrated since."""
-    T = state.session.workcell.setup.T_range_offset
-    return not np.allclose(T, np.eye(4), atol=CALIBRATED)
+def _moved(state: State, label: str, session: Session, sentence: str) -> State:
+    """The range finder stands elsewhere, or is believed to: said, with what went by it."""
+    gone = f" {GONE}" if state.session.scene is not None or state.session.results else ""
+    return replace(state.changed(label, session), playing=False).told(f"{sentence}{gone}")

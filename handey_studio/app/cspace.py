@@ -18,7 +18,8 @@ def slice_html(space: CSpaceSummary, q: NDArray) -> str:
     first, second, third = (joint + 1 for joint in space.joints)
     words = f"Slice {number + 1} of {len(space.centres[0])}, joint {first} at {np.rad2deg(space.centres[0][number]):.0f}°. "
     words += f"Across: joint {second}, up: joint {third}. "
-    words += f"{np.rad2deg(space.step_rad):.1f}° cells, {100 * space.blocked.mean():.0f} % not wholly free, {space.regions} free regions."
+    words += f"{np.rad2deg(space.step_rad):.1f}° cells, {100 * space.blocked.mean():.0f} % not wholly free, {space.regions} free regions. "
+    words += "Key 7 shows all slices at once."
     return html.figure(slice_svg(space, q, number), chips, words)
 
 

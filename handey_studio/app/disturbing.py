@@ -12,6 +12,8 @@ from handey_studio.cell.faults import Fault
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.session import Session
 from handey_studio.session.destination import destination_pose
+from handey_studio.task.acting import fingers_only
+from handey_studio.task.plan import MovePlan, Step
 
 MAX_FAULTS = 12
 FOR_A_MOMENT_S, SLIP_S = 0.15, 1.5  # a push, and the time in which a part slips or falls
@@ -50,9 +52,33 @@ CALL_WORDS = {
 }
 
 
+USUAL = {
+    "follow": ("to the part", "approach", "lift", "transfer", "retreat", "home"),
+    "grip": ("open", "close", "open again"),
+    "descend": ("place",),
+    "settle": ("after place",),
+}  # without a regrasp, while no plan tells it
+
+
 def kind_of(name: str) -> Kind:
     """The kind of that name."""
     return next(kind for kind in KINDS if kind.name == name)
+
+
+def which_words(plan: MovePlan | None, call: str) -> str:
+    """Which of a MOVE's motions is the first `call`, the second, and so on."""
+    if call == "scan":
+        return "1 is the scan that a MOVE is planned on; a later one checks what was done."
+    names = USUAL[call] if plan is None else [step.kind for step in plan.steps if call in calls_of(step)]
+    told = ", ".join(f"{number} {name}" for number, name in enumerate(names, start=1)) or "none"
+    return f"{'In a MOVE without a regrasp' if plan is None else 'In the plan that is looked at'}: {told}."
+
+
+def calls_of(step: Step) -> tuple[str, ...]:
+    """What the cell is asked for in a step of a plan."""
+    if step.kind in ("close", "open") or fingers_only(step):
+        return ("grip",)
+    return ("descend", "settle") if step.kind == "place" else ("follow",)
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
 """What to do next, said in one sentence for every state that the workbench can be in."""
 
-from handey_studio.app.jobs import CANCELLED
+from handey_studio.app.jobs import CANCELLED, FIRST_JOB
 from handey_studio.app.state import Job, State
 from handey_studio.session.run import PLANNED, SENSED
 from handey_studio.task.move import UNSURE
 
+FIRST = "(The first job after an installation takes a minute or two longer: its code is compiled, once.)"
 STAGES = (("Sense", 0.0), ("Plan", SENSED), ("Execute", PLANNED))
 
 
@@ -25,7 +26,8 @@ def next_step(state: State) -> tuple[str, str, str]:
     session, job = state.session, state.job
     if job is not None:
         what = "Stopping" if job.cancelling else job.title or ("Moving" if job.execute else "Planning")
-        return f"{what} …", job.message, "info"
+        first = f" {FIRST}" if job.number == 1 and job.message != FIRST_JOB else ""
+        return f"{what} …", f"{job.message[:1].upper()}{job.message[1:]}{first}", "info"
     if not session.workcell.parts:
         return "This workcell has no part models", "Model one of what lies in the cell (Model, on the left), or open a session.", "quiet"
     if state.command is None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from handey_studio.app.compared import with_outcome
 from handey_studio.app.state import Job, State, with_view
 from handey_studio.base import BadInput
 from handey_studio.session import CommandState, Session
@@ -12,7 +13,7 @@ from handey_studio.session.sequence import states_of
 from handey_studio.task.plan import MoveResult
 
 KINDS = {"planned": "planned", "done": "good", "failed": "bad"}  # of notices
-FIRST_JOB = "Starting the planner; the first time on a machine it compiles for a minute or more, whatever it says that it is at."
+FIRST_JOB = "Starting the planner. The first time after an installation its code is compiled: a minute or two, once."
 BUSY = "the planner is at work; cancel first or wait for it."
 CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
 
@@ -68,6 +69,7 @@ class JobDone:
         result = session.result
         if result is None:
             return state
+        state = with_outcome(state)
         kind = KINDS[result.status] if result.reason != CANCELLED else "info"
         return replace(state, playing=state.replay is not None).told(outcome(result), kind)
 

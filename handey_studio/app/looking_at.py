@@ -88,6 +88,16 @@ class ShowLayer:
 
 
 @dataclass(frozen=True)
+class ToggleLayer:
+    """Show what is hidden, hide what is shown."""
+
+    layer: str
+
+    def apply(self, state: State) -> State:
+        return ShowLayer(self.layer, self.layer in state.session.view.hidden_layers).apply(state)
+
+
+@dataclass(frozen=True)
 class Select:
     """Look at one data edge or result; -1 for none (the last result)."""
 

@@ -109,7 +109,9 @@ class ChooseRobot:
     robot: str
 
     def apply(self, state: State) -> State:
-        return state.changed("choose robot", with_robot(state.session, self.robot))
+        lost = bool(state.session.results) and self.robot != state.session.workcell.robot
+        changed = state.changed("choose robot", with_robot(state.session, self.robot))
+        return changed.told("What was planned for the arm before is gone; what was scanned stays.") if lost else changed
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,8 @@ class ResetCell:
 
     def apply(self, state: State) -> State:
         check_idle(state)
-        return replace(state, session=state.session.without_findings(), playing=False)
+        state = replace(state, session=state.session.without_findings(), playing=False)
+        return state.told("The cell is as it was before the first MOVE; nothing is scanned or planned.")
 
 
 def _with_command(state: State, label: str, command: MoveCommand) -> State:

@@ -8,6 +8,7 @@ from typing import Any
 
 from handey_studio.app.grasp_look import GraspLook
 from handey_studio.app.modelling.look import ModelLook
+from handey_studio.app.outcome import Outcome
 from handey_studio.app.settings import Settings
 from handey_studio.base import Entry
 from handey_studio.localization import Hypothesis
@@ -81,7 +82,8 @@ class State:
     `ledger_at` is the entry whose branches are listed, page by page, `ledger_entry` the one that is looked at; `ROOT` is none.
     `hypothesis_part`, `hypothesis_verdict` and `edge_min_m` narrow down what of the localizer's work is looked at.
     `chosen` is the place in the list of the command that is set up, -1 for the last. `calibration` is
-    one that was neither accepted nor discarded yet. `left_behind` is a working copy of an earlier run that waits for a word of the user's,
+    one that was neither accepted nor discarded yet, `outcomes` are the MOVEs carried out since the session was opened. `left_behind` is a
+    working copy of an earlier run that waits for a word of the user's,
     `taken_up` whether this session is one.
     """
 
@@ -114,6 +116,7 @@ class State:
     model: ModelLook = field(default_factory=ModelLook)
     chosen: int = -1
     calibration: RangeCalibration | None = None
+    outcomes: tuple[Outcome, ...] = ()
     left_behind: Path | None = None
     taken_up: bool = False
     loads: int = field(default=0)

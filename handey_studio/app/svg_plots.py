@@ -15,7 +15,7 @@ from handey_studio.cell.protocol import TOUCH_N
 from handey_studio.session import PerformedReplay
 from handey_studio.task.noticing import GRIP_TOLERANCE_M
 
-ROW, GAP, MARKS = 26, 3, 14  # pixels: a plot's height, what is between two, and the line of contacts above them
+ROW, WORDS, GAP, MARKS = 24, 12, 3, 14  # pixels: a plot's height, that of its words above it, what is between two, the line of contacts
 WIDE = 1000.0  # units across a picture, whatever the panel's width
 COLUMNS = 500  # of a curve are told apart
 GUARDED = ("place", "search")  # motions that end when something is felt
@@ -81,7 +81,7 @@ def plots_html(replay: PerformedReplay, field: str = "") -> str:
 def cursor(replay: PerformedReplay, time_s: float) -> str:
     """The line at the time that is looked at. It stands before the plots on the page, and hangs down over them."""
     left = 100.0 * time_s / max(replay.duration, 1e-9)
-    height = MARKS + 3 * (ROW + GAP)
+    height = MARKS + 3 * (WORDS + ROW + GAP)
     line = f"position:absolute;left:{left:.3f}%;top:2px;height:{height}px;width:2px;background:{css(palette.INK)};z-index:2"
     mark = f'<div data-testid="plot-cursor" style="{line};pointer-events:none"></div>'
     return f'<div style="position:relative;height:0;margin:0 14px">{mark}</div>'
@@ -93,7 +93,7 @@ def now_words(replay: PerformedReplay, time_s: float) -> str:
     up, sideways, finger = (float(np.interp(time_s, traces.time_s, c)) for c in (traces.up_N, traces.sideways_N, traces.finger_N))
     turned = np.rad2deg(np.abs(moment.q_rad - moment.q_command_rad).max())
     wrist = f"wrist {abs(up):.1f} N {'up' if up > 0 else 'down'}, {sideways:.1f} N sideways"
-    fingers = f"fingers {1e3 * moment.hand_opening_m:.1f} mm, {finger:.0f} N"
+    fingers = f"fingers {1e3 * moment.hand_opening_m:.1f} mm, {abs(finger):.0f} N"
     return f"{wrist} · {fingers} · off by {1e3 * hand_off(replay.robot, moment):.1f} mm, {turned:.2f}°"
 
 
@@ -118,7 +118,7 @@ def _widths(replay: PerformedReplay) -> tuple[Limit, ...]:
 
 
 def _row(plot: Plot, times: NDArray, duration: float) -> str:
-    """One plot; its words stand over it, so that they are not stretched with it."""
+    """One plot; its words stand above it, so that they neither hide it nor are stretched with it."""
     low, high = plot.span
 
     def down(value: float) -> float:
@@ -131,11 +131,10 @@ def _row(plot: Plot, times: NDArray, duration: float) -> str:
         f'<svg width="100%" height="{ROW}" viewBox="0 0 {WIDE:g} {ROW}" preserveAspectRatio="none" style="display:block;background:#f5f7f9;'
         f'border-radius:3px">{zero}{"".join(lines)}</svg>'
     )
-    words = "position:absolute;font-size:10px;line-height:11px;color:#55606e;background:#f5f7f9b0;padding:0 2px;pointer-events:none"
-    ticks = f"{_number(max(np.abs(curve.values).max() for curve in plot.curves))} {plot.unit}"
+    words = f"display:flex;justify-content:space-between;font-size:10px;line-height:{WORDS}px;height:{WORDS}px;color:#55606e"
+    most = f"at most {_number(max(np.abs(curve.values).max() for curve in plot.curves))} {plot.unit}"
     return (
-        f'<div style="position:relative;margin-bottom:{GAP}px">{svg}<span style="{words};left:1px;top:1px">{html.esc(plot.title)}</span>'
-        f'<span style="{words};right:1px;top:1px">most {ticks}</span></div>'
+        f'<div style="margin-bottom:{GAP}px"><div style="{words}"><span>{html.esc(plot.title)}</span><span>{most}</span></div>{svg}</div>'
     )
 
 

@@ -7,6 +7,7 @@ import viser
 
 from handey_studio.app import palette
 from handey_studio.app.modelling.aside import aside
+from handey_studio.app.page_style import PAGE
 from handey_studio.app.panels.cell import CellPanel
 from handey_studio.app.panels.edges import EdgesPanel
 from handey_studio.app.panels.findings import PathPanel, ResultPanel
@@ -43,7 +44,7 @@ from handey_studio.app.wire import Send
 
 log = logging.getLogger(__name__)
 
-LEFT_WIDTH, RIGHT_WIDTH = 318, 348
+LEFT_WIDTH, RIGHT_WIDTH = 318, 358
 
 
 class Pane(Protocol):
@@ -63,6 +64,7 @@ class View:
         scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), HypothesisScene(server)]
         scenes += [PairScene(server), PlanScene(server), GraspScene(server), StandingScene(server)]
         scenes += [CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
+        server.gui.add_html(PAGE)
         session = SessionPanel(server, send)
         self._of_move: list[Pane] = scenes
         models: list[Pane] = [ScanScene(server), SolidScene(server), ClickScenes(server, send), GizmoScene(server, send)]

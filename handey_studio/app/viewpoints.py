@@ -67,7 +67,7 @@ def viewpoint(view: str, state: State) -> tuple[NDArray, NDArray]:
     if view == "Hand" and replay is not None:
         return _seen_from(replay.at(state.session.view.time_s).T_world_part[:3, 3], (0.30, -0.34, 0.26))
     if view == "C-space" and replay is not None and replay.plan.carries[0].space is not None:
-        return _seen_from(MIDDLE_M, (1.3, -1.85, 0.95))
+        return _seen_from(MIDDLE_M - np.array([0.0, 0.0, 0.16]), (1.4, -2.0, 1.15))  # above the timeline
     if view == "Hypothesis" and state.hypothesis is not None:
         return _close_to(state, state.hypothesis)
     if view == "Workcell":

@@ -78,28 +78,38 @@ def set_to(handle: Any, **properties: Any) -> None:
             setattr(handle, key, value)
 
 
-PRESS_TAB = """
-let tries = 0;
-const waiting = setInterval(() => {
-  const tab = [...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent.trim() === LABEL);
-  if (tab) {
+SHOW_TABS = """
+const pressTab = (label) => {
+  const tab = [...document.querySelectorAll('[role=tab]')].find(tab => tab.textContent.trim() === label);
+  if (tab && tab.getAttribute('aria-selected') !== 'true') {
     const kept = event => event.stopPropagation();
     document.body.addEventListener('keydown', kept);
     tab.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter', bubbles: true}));
     document.body.removeEventListener('keydown', kept);
+    tab.click();
   }
-  if (tab || ++tries > 100) clearInterval(waiting);
+  return tab;
+};
+const kept = REMEMBERED ? JSON.parse(sessionStorage.getItem('tabs in front') || 'null') : null;
+let wanted = kept || LABELS, tries = 0;
+const waiting = setInterval(() => {
+  wanted = wanted.filter(label => !pressTab(label));
+  if (!wanted.length || ++tries > 100) clearInterval(waiting);
 }, 100);
-"""  # a tab of a panel answers to keys and to the pointer, not to a plain click; the key must not reach the page's shortcuts
+window.onpagehide = () => sessionStorage.setItem('tabs in front', JSON.stringify(
+  [...document.querySelectorAll('[role=tab][aria-selected=true]')].map(tab => tab.textContent.trim())));
+"""  # a tab of a docked panel answers to keys and to the pointer, not to a plain click; the key must not reach the page's shortcuts
 
 
-def show_tab(client: viser.ClientHandle, label: str) -> None:
-    """Bring the tab of that name to the front in one browser; this version of viser has no call for it, so the page presses it itself."""
+def show_tabs(client: viser.ClientHandle, *labels: str, remembered: bool = False) -> None:
+    """Bring the tabs of those names to the front in one browser, or with `remembered`, those that were in front before its page was loaded
+    anew; this version of viser has no call for it, so the page presses them itself."""
     connection, message = getattr(client, "_websock_connection", None), getattr(_messages, "RunJavascriptMessage", None)
     if connection is None or message is None:
         log.warning("this version of viser cannot bring a tab to the front")
         return
-    connection.queue_message(message(source=PRESS_TAB.replace("LABEL", json.dumps(label))))
+    source = SHOW_TABS.replace("LABELS", json.dumps(labels)).replace("REMEMBERED", json.dumps(remembered))
+    connection.queue_message(message(source=source))
 
 
 def close_share_tunnel(server: viser.ViserServer) -> None:

@@ -26,7 +26,7 @@ from handey_studio.app.playback import Tick
 from handey_studio.app.scene.units import SCALE, metres
 from handey_studio.app.state import State, opened
 from handey_studio.app.view import View
-from handey_studio.app.wire import show_tab
+from handey_studio.app.wire import show_tabs
 from handey_studio.base import BadInput
 from handey_studio.session import Session
 from handey_studio.world import Library
@@ -152,11 +152,12 @@ class Workbench:
             return self.state.told(f"{type(command).__name__} broke down and changed nothing. {RELOAD}", "bad")
 
     def _turn(self, old: State) -> None:
-        """When the model is opened or closed, its tab or that of the MOVE comes to the front, and the cameras go there or back."""
+        """What is new comes to the front; when the model is opened or closed, the cameras go there or back."""
         new = self.state
-        if old.model.open != new.model.open:
+        news = tabs_with_news(old, new)
+        if news:
             for client in self.server.get_clients().values():
-                show_tab(client, "Model" if new.model.open else "Move")
+                show_tabs(client, *news)
         if old.modelling == new.modelling:
             return
         if new.modelling:
@@ -183,7 +184,7 @@ class Workbench:
 
     def _arrived(self, client: viser.ClientHandle) -> None:
         self.send(Viewers(1))
-        show_tab(client, "Model" if self.state.model.open else "Move")
+        show_tabs(client, *front_tabs(self.state), remembered=True)
 
         def moved(camera: viser.CameraHandle) -> None:
             self._camera = CameraMoved(metres(camera.position), metres(camera.look_at))
@@ -196,6 +197,20 @@ class Workbench:
         camera.position = tuple(position * SCALE)
         camera.look_at = tuple(look_at * SCALE)
         camera.fov = FIELD_OF_VIEW_RAD
+
+
+def front_tabs(state: State) -> tuple[str, str]:
+    """The tabs of the left and the right panel that go with what is done now."""
+    return ("Model", "Part") if state.model.open else ("Move", "Result")
+
+
+def tabs_with_news(old: State, new: State) -> tuple[str, ...]:
+    """The tabs to bring to the front after a step: those of the model or the MOVE that one turns to, the result of what was carried out."""
+    if old.model.open != new.model.open:
+        return front_tabs(new)
+    result = new.session.result
+    carried_out = old.job is not None and new.job is None and result is not None and result is not old.session.result
+    return ("Result",) if carried_out and result is not None and result.performances else ()
 
 
 def heard(message: Any) -> Any:

@@ -50,7 +50,7 @@ class ViewState(Value):
     edge: int = -1
     result: int = -1
     attempt: int = -1
-    hidden_layers: tuple[str, ...] = ("configuration space",)
+    hidden_layers: tuple[str, ...] = ("configuration space", "plots")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "camera_position", frozen_array(self.camera_position))

@@ -9,8 +9,9 @@ import pytest
 
 from handey_studio.app import autosave
 from handey_studio.app.autosave import Autosave, LetGo, Offer, TakeUp, left_behind, own_copy
-from handey_studio.app.calibrating import AcceptCalibration, Misplace, calibration_done, is_misplaced
+from handey_studio.app.calibrating import AcceptCalibration, Misplace, calibration_done
 from handey_studio.app.commands import Redo, Undo
+from handey_studio.app.compared import is_misplaced
 from handey_studio.app.disturbing import KINDS, AddFault, ClearFaults, SetPhysics, words_of
 from handey_studio.app.exporting import exported
 from handey_studio.app.happened import LookAtHappening, happenings

@@ -22,6 +22,7 @@ def test_what_really_happened_is_played_and_told(studio, visit, tmp_path):
     page = visit(workbench, viewport=LARGE)
     press_row(page, "happened-0")
     wait_until(lambda: "nobody knows where the part is" in pane(page, "step-name").inner_text())
+    press(page, "Plots")
     plots = pane(page, "plots")
     box, first = plots.bounding_box(), plots.inner_html()
     page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])

@@ -1,5 +1,6 @@
 """Calibrate the range finder: start, the residual of each pose as a picture, the frame beside the paper's answer, Accept or Discard."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,9 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove
-from handey_studio.app.calibrating import AcceptCalibration, DiscardCalibration, Misplace, StartCalibration, is_misplaced
+from handey_studio.app.calibrating import MISPLACED_HINT, AcceptCalibration, DiscardCalibration, Misplace, StartCalibration
+from handey_studio.app.compared import is_misplaced
+from handey_studio.app.outcome import Outcome
 from handey_studio.app.palette import css
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
@@ -24,9 +27,7 @@ class CalibrationPanel:
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         gui.add_html(f'<div style="margin:0 14px 4px;font-size:12px;line-height:1.4;color:#6b7684">{HOW}</div>')
-        self._misplaced = gui.add_checkbox(
-            "Misplaced", False, hint="The simulated range finder is moved by some mm and turned; by how much stays hidden"
-        )
+        self._misplaced = gui.add_checkbox("Misplaced", False, hint=MISPLACED_HINT)
         self._poses: Any = gui.add_number("Poses", 10, min=3, max=100, step=1)
         self._start = gui.add_button("Calibrate", icon=viser.Icon.CUBE, color=palette.ARM_DARK)
         self._progress = gui.add_html("", visible=False)
@@ -34,6 +35,7 @@ class CalibrationPanel:
         self._accept = gui.add_button("Accept", icon=viser.Icon.CHECK, color=palette.BLUE, visible=False)
         self._discard = gui.add_button("Discard", color="gray", visible=False)
         self._found = gui.add_html("")
+        self._outcomes = gui.add_html("")
         on_user(self._misplaced, send, lambda event: Misplace(bool(event.target.value)))
         on_click(self._start, send, lambda _: StartCalibration(int(self._poses.value)))
         on_click(self._cancel, send, lambda _: CancelMove())
@@ -49,6 +51,8 @@ class CalibrationPanel:
         set_to(self._progress, visible=running, content=html.card(f"{100 * job.fraction:.0f} %", job.message) if job and running else "")
         if old is None or old.calibration is not found:
             self._found.content = found_html(found) if found is not None else ""
+        if old is None or old.outcomes != new.outcomes:
+            self._outcomes.content = outcomes_html(new.outcomes)
         set_to(self._accept, visible=found is not None and found.fit is not None, disabled=job is not None)
         set_to(self._discard, visible=found is not None)
 
@@ -64,6 +68,33 @@ def found_html(found: RangeCalibration) -> str:
     rows = "".join(f"<li>{html.esc(line)}</li>" for line in lines)
     words = f'<ul data-testid="calibration" style="margin:4px 14px 6px;padding-left:16px;font-size:12px;line-height:1.45">{rows}</ul>'
     return cards + residuals_svg(fit) + words
+
+
+def outcomes_html(outcomes: Sequence[Outcome]) -> str:
+    """The MOVEs of this session side by side: a row each, the last one first."""
+    if not outcomes:
+        return ""
+    head = _row(("range finder", "MOVE", "tries", "noticed", "seen off", "truly off"), "color:#6b7684")
+    rows = "".join(_row(_words(one)) for one in reversed(outcomes))
+    note = "Off its command, as the scan afterwards saw it, and truly: known only because the cell is simulated."
+    style = "margin:2px 14px 6px;font-size:11.5px;line-height:1.35;font-variant-numeric:tabular-nums"
+    table = f'<table>{head}{rows}</table><div style="color:#6b7684">{note}</div>'
+    return f'{html.heading("MOVEs before and after")}<div data-testid="outcomes" style="{style}">{table}</div>'
+
+
+def _words(one: Outcome) -> tuple[str, ...]:
+    where = "misplaced" if one.misplaced else "in place"
+    return where, one.status, str(one.attempts), str(one.noticed), off_words(one.seen_off), off_words(one.truly_off)
+
+
+def _row(words: Sequence[str], look: str = "") -> str:
+    cells = "".join(f'<td style="padding:1px 7px 1px 0;vertical-align:top;{look}">{html.esc(word)}</td>' for word in words)
+    return f"<tr>{cells}</tr>"
+
+
+def off_words(off: tuple[float, float] | None) -> str:
+    """A distance and an angle."""
+    return "–" if off is None else f"{1e3 * off[0]:.1f} mm, {np.rad2deg(off[1]):.1f}°"
 
 
 def residuals_svg(fit: FrameFit) -> str:

@@ -7,6 +7,7 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove
+from handey_studio.app.page_style import in_a_row
 from handey_studio.app.palette import css
 from handey_studio.app.sequence import AddCommand, ChooseCommand, RemoveCommand, RunCommands, ShiftCommand, SkipCommand, StartOver
 from handey_studio.app.state import State
@@ -41,6 +42,7 @@ class CommandsPanel:
         )
         self._step = gui.add_button("Step", icon=viser.Icon.PLAYER_SKIP_FORWARD, color=palette.ARM_DARK, hint="Only the next command")
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color=palette.VERMILLION, visible=False)
+        gui.add_html(in_a_row([element_id(self._run), element_id(self._step)]))
         self._first = 0
         for group in (self._edit, self._more):
             on_click(group, send, lambda event: PRESSED[event.target.value])

@@ -5,9 +5,10 @@ from typing import Any
 import viser
 
 from handey_studio.app import html, palette
-from handey_studio.app.disturbing import CALL_WORDS, CALLS, KINDS, AddFault, ClearFaults, SetPhysics, kind_of, words_of
+from handey_studio.app.disturbing import CALL_WORDS, CALLS, KINDS, AddFault, ClearFaults, SetPhysics, kind_of, which_words, words_of
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_user, set_to
+from handey_studio.task.plan import MovePlan
 
 PHYSICS_ON = "The arm is driven joint by joint, the hand holds by friction alone, and whatever is let go falls, slips or tips."
 PHYSICS_OFF = "The arm follows exactly and what it holds is fixed to the hand; only some disturbances can happen then."
@@ -24,12 +25,15 @@ class DisturbingPanel:
         self._what = gui.add_html("")
         self._size: Any = gui.add_number("Size", 0.0, step=1.0)
         self._call = gui.add_dropdown("During", tuple(CALL_WORDS[call] for call in CALLS))
-        self._count: Any = gui.add_number("Its number", 1, min=1, max=999, step=1, hint="The first, second, third … of them in a MOVE")
+        self._count: Any = gui.add_number("Which of them", 1, min=1, max=999, step=1, hint="The first, second, third … in a MOVE")
+        self._which = gui.add_html("")
         self._after: Any = gui.add_number("After (s)", 0.2, min=0.0, max=600.0, step=0.1)
         self._add = gui.add_button("Disturb", icon=viser.Icon.BOLT, color=palette.ARM_DARK)
         self._set = gui.add_html("")
         self._clear = gui.add_button("Clear all disturbances", color="gray", visible=False)
+        self._plan: MovePlan | None = None
         self._choose(KINDS[0].name)
+        on_user(self._call, send, lambda _: self._tell_which())
         on_user(self._physics, send, lambda event: SetPhysics(bool(event.target.value)))
         on_user(self._kind, send, lambda event: self._choose(event.target.value))
         on_click(self._add, send, lambda _: self._typed())
@@ -42,13 +46,21 @@ class DisturbingPanel:
         self._size.value, self._count.value = kind.usual, kind.count
         self._call.value = CALL_WORDS[kind.call]
         self._what.content = _small(kind.what)
+        self._tell_which()
+
+    def _tell_which(self) -> None:
+        set_to(self._which, content=_small(which_words(self._plan, self._called()), "which"))
 
     def _typed(self) -> AddFault:
-        call = next(call for call in CALLS if CALL_WORDS[call] == self._call.value)
-        return AddFault(self._kind.value, float(self._size.value), call, int(self._count.value), float(self._after.value))
+        return AddFault(self._kind.value, float(self._size.value), self._called(), int(self._count.value), float(self._after.value))
+
+    def _called(self) -> str:
+        return next(call for call in CALLS if CALL_WORDS[call] == self._call.value)
 
     def render(self, old: State | None, new: State) -> None:
         setup = new.session.workcell.setup
+        self._plan = new.attempt.plan if new.attempt is not None else None
+        self._tell_which()
         busy = new.job is not None
         set_to(self._physics, value=setup.physics, disabled=busy)
         set_to(self._about, content=_small(PHYSICS_ON if setup.physics else PHYSICS_OFF))

@@ -76,23 +76,25 @@ def result_html(result: MoveResult) -> str:
     title = f"MOVE {result.command.part} TO {result.command.to}"
     said = {"planned": "Planned, not carried out yet.", "done": "Done."}.get(result.status, result.reason)
     pane = html.card(title, said, tone, "result")
-    if result.plan is not None:
-        pane += html.facts([*plan_facts(result.plan), *path_facts(result.plan)[:3]])
-    if result.T_world_part_reached is not None and result.plan is not None:
+    if result.plan is None:
+        return pane
+    facts = [*plan_facts(result.plan), *path_facts(result.plan)[:3]]
+    if result.T_world_part_reached is not None:
         metres, radians = pose_difference(result.T_world_part_reached, result.plan.T_world_part_goal)
-        pane += html.facts([("Reached within", f"{1e3 * metres:.2f} mm, {np.rad2deg(radians):.2f}°")])
-    return pane
+        facts.append(("Reached", f"within {1e3 * metres:.2f} mm and {np.rad2deg(radians):.2f}° of the command"))
+    return pane + html.facts(facts)
 
 
 def timing_html(result: MoveResult) -> str:
-    """How long each stage took."""
+    """How long each stage kept the computer busy."""
     timing = [(stage, f"{seconds:.2f} s") for stage, seconds in result.timing_s.items()]
-    return html.heading("Seconds a stage") + html.facts(timing, "timing")
+    return html.heading("Computing time") + html.facts(timing, "timing")
 
 
 def plan_facts(plan: MovePlan) -> list[tuple[str, str]]:
     """A plan's steps."""
-    return [("Steps", " → ".join(step.kind for step in plan.steps)), ("Duration", f"{plan.duration:.1f} s, {plan.regrasps} regrasps")]
+    regrasps = {0: "no regrasp", 1: "1 regrasp"}.get(plan.regrasps, f"{plan.regrasps} regrasps")
+    return [("Steps", " → ".join(step.kind for step in plan.steps)), ("As planned", f"{plan.duration:.1f} s, {regrasps}")]
 
 
 def path_facts(plan: MovePlan) -> list[tuple[str, str]]:

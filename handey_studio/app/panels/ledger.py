@@ -82,15 +82,15 @@ def _row(entry: Entry, below: tuple[int, int], looked_at: bool, button: str) -> 
     fell = entry.reason is not None
     colour, sign = (palette.VERMILLION, "✕") if fell else (palette.TEAL, "●")
     look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if looked_at else "border-left-color:#e3e8ee"
-    clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     more = f'<span style="color:#6b7684;white-space:nowrap">{below[0]} ▸</span>' if below[0] else ""
     said = html.esc(describe(entry) or (f"{below[1]} of {below[0]} below it fell" if below[0] else "nothing speaks against it"))
     return (
-        f'<div data-testid="entry-{entry.id}" role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}" title="{said}" '
+        f'<div data-testid="entry-{entry.id}" role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}" '
         f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
         f'<div style="display:flex;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span>'
-        f'<span style="flex:1;{clipped}"><span style="color:#8a94a0">{html.esc(entry.stage)}</span> {html.esc(entry.option)}</span>'
-        f'{more}</div><div style="color:#6b7684;padding-left:18px;font-size:11.5px;{clipped}">{said}</div></div>'
+        f'<span style="flex:1;overflow-wrap:anywhere"><span style="color:#8a94a0">{html.esc(entry.stage)}</span> '
+        f"{html.esc(entry.option)}</span>"
+        f'{more}</div><div style="color:#6b7684;padding-left:18px;font-size:11.5px">{said}</div></div>'
     )
 
 

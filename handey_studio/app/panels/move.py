@@ -9,6 +9,7 @@ from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove, StartMove
 from handey_studio.app.commands import Redo, Undo
 from handey_studio.app.guidance import next_step, stages
+from handey_studio.app.page_style import in_a_row
 from handey_studio.app.panels.commands import CommandsPanel
 from handey_studio.app.scene.destination import ghost_pose
 from handey_studio.app.setting_up import (
@@ -23,7 +24,7 @@ from handey_studio.app.setting_up import (
     SetSeed,
 )
 from handey_studio.app.state import State
-from handey_studio.app.wire import Send, on_click, on_user, set_to
+from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy
 from handey_studio.session.checks import MAX_ATTEMPTS, MAX_IMPROVE
 from handey_studio.session.destination import anywhere, destinations_on_parts
@@ -31,11 +32,6 @@ from handey_studio.task.destination import format_pose
 from handey_studio.task.plan import MoveCommand
 
 NO_PART = "–"
-KEYS = (
-    '<div style="margin:14px 14px 6px;font-size:11.5px;line-height:1.6;color:#8a94a0">Space plays, J and L go by steps, 1 to 5 look from '
-    "elsewhere, P plans, M moves; N and B look at the next hypothesis and the one before, 6 from close up; 7 looks at the configuration "
-    "space. Ctrl+K lists every command. Click a located part to choose it, a data edge or a hypothesis to read about it.</div>"
-)
 
 
 class MovePanel:
@@ -52,8 +48,8 @@ class MovePanel:
         self._move = gui.add_button("MOVE", icon=viser.Icon.PLAYER_PLAY_FILLED, color=palette.BLUE, hint="Sense, plan and carry it out")
         self._cancel = gui.add_button("Cancel", icon=viser.Icon.PLAYER_STOP, color=palette.VERMILLION, visible=False)
         self._bar = gui.add_progress_bar(0.0, animated=True, color=palette.BLUE, visible=False)
-        self._undo = gui.add_button("Undo", icon=viser.Icon.ARROW_BACK_UP, disabled=True)
-        self._redo = gui.add_button("Redo", icon=viser.Icon.ARROW_FORWARD_UP, disabled=True)
+        self._undo = gui.add_button("Undo", icon=viser.Icon.ARROW_BACK_UP, color="gray", visible=False)
+        self._redo = gui.add_button("Redo", icon=viser.Icon.ARROW_FORWARD_UP, color="gray", visible=False)
         with gui.add_folder("Options", expand_by_default=False):
             self._seed = gui.add_number("Seed", 0, min=0, max=2**31 - 1, step=1, hint="The same seed gives the same plan")
             self._robot = gui.add_dropdown("Robot", (NO_PART,), hint="The arm in the workcell; what was planned for another goes")
@@ -66,7 +62,7 @@ class MovePanel:
             )
         with gui.add_folder("Commands"):
             self._commands = CommandsPanel(gui, send)
-        gui.add_html(KEYS)
+        gui.add_html(in_a_row([element_id(self._plan), element_id(self._move)]))
         self._wire(send)
 
     def _wire(self, send: Send) -> None:
@@ -98,8 +94,8 @@ class MovePanel:
         self._show_command(new)
         self._show_job(new)
         undo, redo = new.undo[-1:], new.redo[-1:]
-        set_to(self._undo, label=f"Undo: {undo[0].label}" if undo else "Undo", disabled=not undo or new.job is not None)
-        set_to(self._redo, label=f"Redo: {redo[0].label}" if redo else "Redo", disabled=not redo or new.job is not None)
+        set_to(self._undo, label=f"Undo: {undo[0].label}" if undo else "Undo", visible=bool(undo), disabled=new.job is not None)
+        set_to(self._redo, label=f"Redo: {redo[0].label}" if redo else "Redo", visible=bool(redo), disabled=new.job is not None)
 
     def _show_command(self, state: State) -> None:
         session, command, busy = state.session, state.command, state.job is not None

@@ -37,13 +37,13 @@ def _row(scene: Scene, number: int, chosen: bool, button: str) -> str:
     clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     said = html.esc(reason_of(scene, hypothesis))
     return (
-        f'<div data-testid="hypothesis-{number}"{click} aria-pressed="{str(chosen).lower()}" title="{said}" '
+        f'<div data-testid="hypothesis-{number}"{click} aria-pressed="{str(chosen).lower()}" '
         f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
         f'<div style="display:flex;align-items:center;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span>'
         f'<span style="color:#8a94a0;width:16px">{number + 1}</span>'
         f'<b style="font-weight:600;flex:1;{clipped}">{html.esc(hypothesis.part)}</b>{_bar(hypothesis, colour)}'
         f'<span style="width:40px;text-align:right;font-variant-numeric:tabular-nums">{percent(hypothesis.score)}</span></div>'
-        f'<div style="color:#6b7684;padding-left:18px;font-size:11.5px;{clipped}">{said}</div></div>'
+        f'<div style="color:#6b7684;padding-left:18px;font-size:11.5px">{said}</div></div>'
     )
 
 

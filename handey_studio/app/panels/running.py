@@ -55,9 +55,13 @@ def happened_html(state: State, buttons: Sequence[str]) -> str:
 def _facts(result: MoveResult, most_mm: float) -> list[tuple[str, str]]:
     seconds = sum(performance.seconds for performance in result.performances)
     turned = max(performance.tracking.joint_rad for performance in result.performances)
+    count = len(result.performances)
     physics = "simulated with physics" if result.physics else "followed exactly, grips geometric (no physics)"
     return [
-        ("Took", f"{seconds:.1f} s of the cell's time in {len(result.performances)} attempt{'s' * (len(result.performances) > 1)}"),
+        (
+            "Carried out",
+            f"in {seconds:.1f} s of the cell's time, gripping and feeling included; {count} attempt{'s' * (count > 1)}",
+        ),
         ("Tracked", f"within {most_mm:.1f} mm and {np.rad2deg(turned):.2f}° of the command"),
         ("Cell", physics),
     ]

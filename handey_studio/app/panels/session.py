@@ -6,13 +6,15 @@ import viser
 
 from handey_studio.app import html
 from handey_studio.app.autosave import LetGo, TakeUp
+from handey_studio.app.panels.help import show_guide, show_keys
 from handey_studio.app.session_actions import DownloadSession, NewSession, OpenSession, SaveSession, SaveSessionAs, UploadSession
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, on_upload, set_to
 
 TAKE_UP, LET_GO = "Take it up", "Discard it"
 LEFT = ("Something was not saved", "The workbench ended before a session was saved; a working copy of it is there.")
-BUTTONS = (("Session", ("New", "Open", "Save")), ("Copy", ("Save as", "Download")))
+BUTTONS = (("Session", ("New", "Open", "Save", "Save as")), ("More", ("Download", "Guide", "Keys")))
+MODEL_OPEN = "A model is open: Part tells of it, the other panes of the MOVE before."
 
 
 class SessionPanel:
@@ -35,6 +37,10 @@ class SessionPanel:
             self.ask_open(event.client)
         elif choice == "Save as":
             self.ask_name(event.client)
+        elif choice == "Guide" and event.client is not None:
+            show_guide(event.client)
+        elif choice == "Keys" and event.client is not None:
+            show_keys(event.client)
         return {"New": NewSession(), "Save": SaveSession(), "Download": DownloadSession(event.client_id)}.get(choice)
 
     def ask_open(self, client: viser.ClientHandle | None) -> None:
@@ -90,19 +96,18 @@ class SessionPanel:
             return
         mark = " *" if new.unsaved else ""
         self._server.gui.set_panel_label(f"Handey Studio – {new.session.name}{mark}")
-        self._about.content = html.facts(_about(new), "session-about")
+        model = f'<div style="margin:0 14px 4px;font-size:12px;color:#6b7684">{MODEL_OPEN}</div>' if new.modelling else ""
+        self._about.content = html.facts(_about(new), "session-about") + model
 
 
 def _about(state: State) -> list[tuple[str, str]]:
     session = state.session
-    rows = [
-        ("Session", session.name + (" (not saved)" if state.unsaved else "")),
-        ("Robot", session.workcell.robot),
-        ("Parts", ", ".join(session.workcell.parts) or "none"),
-    ]
-    return [*rows, ("Viewers", str(state.viewers))] if state.viewers > 1 else rows
+    saved = " (not saved)" if state.unsaved else ""
+    what = f"{session.name}{saved}: {session.workcell.robot}, {', '.join(session.workcell.parts) or 'no parts'}"
+    viewers = [("Viewers", str(state.viewers))] if state.viewers > 1 else []
+    return [("Session", what), *viewers]
 
 
 def _looks(state: State) -> tuple:
     session = state.session
-    return session.name, state.unsaved, session.workcell.robot, session.workcell.parts, state.viewers
+    return session.name, state.unsaved, session.workcell.robot, session.workcell.parts, state.viewers, state.modelling

@@ -5,6 +5,7 @@ from typing import Any
 import viser
 
 from handey_studio.app import html
+from handey_studio.app.looking_at import ToggleLayer
 from handey_studio.app.palette import STEP_COLOURS, css
 from handey_studio.app.playback import Seek, SeekStep, SetPlayback, TogglePlay
 from handey_studio.app.state import State
@@ -12,14 +13,25 @@ from handey_studio.app.svg_plots import cursor, now_words, plots_html
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.session import PerformedReplay, Stretch
 
-FIRST, BACK, PLAY, ON, LAST = "|◀", "◀ Step", "Play / Pause", "Step ▶", "▶|"
+FIRST, BACK, PLAY, ON, LAST, PLOTS = "|◀", "◀ Step", "Play / Pause", "Step ▶", "▶|", "Plots"
 SPEEDS = {"½×": 0.5, "1×": 1.0, "3×": 3.0}
-WIDTH = 640
+PRESSED = {
+    FIRST: SeekStep(-99),
+    BACK: SeekStep(-1),
+    PLAY: TogglePlay(),
+    ON: SeekStep(1),
+    LAST: SeekStep(99),
+    **{label: SetPlayback(speed=speed) for label, speed in SPEEDS.items()},
+    PLOTS: ToggleLayer("plots"),
+}
+BUTTONS = tuple(label for label in PRESSED if label != PLOTS)
+WIDTH = 574  # what a window 1280 pixels wide leaves between the other panels
+LETTER = 6.5  # pixels
 OTHER = "free"  # whose colour motions have that no plan names: what leads back after something went wrong
 
 
 class TimelinePanel:
-    """A strip of what was done or is planned, the plots of what was measured, a slider in seconds, and the playing."""
+    """A strip of what was done or is planned, a slider in seconds, the playing, and if asked the plots of what was measured."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._panel = panel = gui.add_panel()
@@ -29,11 +41,11 @@ class TimelinePanel:
             self._cursor = gui.add_html("")
             self._plots = gui.add_html("")
             self._slider = gui.add_slider("Time (s)", min=0.0, max=1.0, step=0.01, initial_value=0.0, visible=False)
-            self._buttons = gui.add_button_group("Play", (FIRST, BACK, PLAY, ON, LAST, *SPEEDS), visible=False)
+            self._buttons = gui.add_button_group("Play", BUTTONS, visible=False)
         panel.float(x=14, y=-14, width=WIDTH)
         on_user(self._slider, send, lambda event: Seek(float(event.target.value)))
         on_user(self._seek, send, lambda event: Seek(float(event.target.value)))
-        on_click(self._buttons, send, _pressed)
+        on_click(self._buttons, send, lambda event: PRESSED[event.target.value])
 
     def render(self, old: State | None, new: State) -> None:
         if old is not None and old.modelling != new.modelling:
@@ -45,6 +57,7 @@ class TimelinePanel:
         set_to(self._buttons, visible=replay is not None)
         if replay is not None:
             set_to(self._slider, max=round(replay.duration, 2))
+            set_to(self._buttons, options=(*BUTTONS, PLOTS) if isinstance(replay, PerformedReplay) else BUTTONS)
         set_to(self._slider, value=round(min(time_s, self._slider.max), 2))
         field = element_id(self._seek)
         self._strip.content = html.unseen([field]) + (strip(new, field) if replay else html.empty(NO_PLAN, "timeline-empty"))
@@ -101,21 +114,16 @@ def now_playing(state: State) -> str:
 
 
 def _box(stretch: Stretch, now: bool, total: float) -> str:
+    """A stretch with its name, where that is too long with the step's number, as far as either fits."""
     share = 100.0 * (stretch.end - stretch.start) / total
-    name = stretch.what if share > 100 * 6.5 * len(stretch.what) / (WIDTH - 40) else ""
+    words = (stretch.what, "" if stretch.back else str(stretch.step + 1), "")
+    name = next(word for word in words if share > 100 * LETTER * len(word) / (WIDTH - 40) or not word)
     colour = css(STEP_COLOURS.get(stretch.what.split(",")[0], STEP_COLOURS[OTHER]))
     return (
         f'<div title="{html.esc(stretch.what)} {stretch.end - stretch.start:.1f} s" style="width:{share:.3f}%;background:{colour};'
         f'opacity:{1.0 if now else 0.55};overflow:hidden;white-space:nowrap;text-align:center;border-right:1px solid #fff">'
         f"{html.esc(name)}</div>"
     )
-
-
-def _pressed(event: Any) -> Any:
-    value = event.target.value
-    if value in SPEEDS:
-        return SetPlayback(speed=SPEEDS[value])
-    return {FIRST: SeekStep(-99), BACK: SeekStep(-1), ON: SeekStep(1), LAST: SeekStep(99)}.get(value, TogglePlay())
 
 
 def _looks(state: State) -> tuple:

@@ -9,6 +9,7 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import palette
+from handey_studio.app.cspace import nearest
 from handey_studio.app.scene.units import SCALE, scaled
 from handey_studio.app.state import State
 from handey_studio.motion import CSpaceSummary
@@ -22,6 +23,9 @@ MIDDLE_M = CORNER_M + SIDE_M / 2
 CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 BOX = np.array([(a, b) for a in CORNERS for b in CORNERS if (b >= a).all() and (b - a).sum() == 1])  # the sides of a unit cube
 SAMPLES = 160
+NONE = -1
+FORBIDDEN = (*palette.VERMILLION, 70)  # of a slice, to be seen through
+FACING = (0.5, -0.5, -0.5, 0.5)  # turns a picture so that its right is the second joint's axis and its top the third's
 
 
 class CSpaceScene:
@@ -32,6 +36,8 @@ class CSpaceScene:
         self._root: viser.FrameHandle | None = None
         self._marker: viser.IcosphereHandle | None = None
         self._slice: viser.FrameHandle | None = None
+        self._picture: viser.ImageHandle | None = None
+        self._number = NONE
         self._carry: Carry | None = None
 
     def render(self, old: State | None, new: State) -> None:
@@ -63,6 +69,7 @@ class CSpaceScene:
         for text, at in axis_labels(space):
             self._scene.add_label(f"{ROOT}/labels/{text}", text, position=tuple(SIDE_M * SCALE * np.array(at)))
         self._slice = self._scene.add_frame(f"{ROOT}/slice", show_axes=False)
+        self._picture, self._number = None, NONE
         self._lines("slice/outline", BOX[(BOX[:, :, 0] == 0).all(axis=1)], palette.VERMILLION, 3.0)
         self._marker = self._scene.add_icosphere(f"{ROOT}/now", radius=0.02 * SCALE, color=palette.ORANGE)
 
@@ -80,9 +87,30 @@ class CSpaceScene:
         replay = state.replay
         if replay is None or self._carry is None or self._carry.space is None or self._marker is None or self._slice is None:
             return
-        here = SIDE_M * SCALE * shares(self._carry.space, replay.at(state.session.view.time_s).q_rad)
+        q = replay.at(state.session.view.time_s).q_rad
+        here = SIDE_M * SCALE * shares(self._carry.space, q)
         self._marker.position = here
         self._slice.position = (here[0], 0.0, 0.0)
+        self._show_slice(self._carry.space, nearest(self._carry.space.centres[0], float(q[self._carry.space.joints[0]])))
+
+    def _show_slice(self, space: CSpaceSummary, number: int) -> None:
+        """What is forbidden at the first joint's angle now, dark in the frame that moves along with it; sent once a slice."""
+        if number == self._number:
+            return
+        self._number = number
+        image = slice_picture(space.blocked[number])
+        if self._picture is not None:
+            self._picture.image = image
+            return
+        side, middle = SIDE_M * SCALE, (0.0, SIDE_M * SCALE / 2, SIDE_M * SCALE / 2)
+        self._picture = self._scene.add_image(f"{ROOT}/slice/picture", image, side, side, format="png", wxyz=FACING, position=middle)
+
+
+def slice_picture(blocked: NDArray) -> NDArray:
+    """A slice (n2, n3) as a picture (n3, n2, 4) uint8, the third joint upwards: what is forbidden is tinted, what is free is clear."""
+    picture = np.zeros((*blocked.T.shape, 4), np.uint8)
+    picture[blocked.T[::-1]] = FORBIDDEN
+    return picture
 
 
 def axis_labels(space: CSpaceSummary) -> list[tuple[str, tuple[float, float, float]]]:
