@@ -164,7 +164,7 @@ def _measures(solid: Polyhedron, density: float) -> tuple[Check, ...]:
     size = np.ptp(solid.vertices, axis=0)
     fits = MIN_SIZE_M <= solid.diameter <= MAX_SIZE_M
     sides = " × ".join(f"{1e3 * side:.1f}" for side in size)
-    at = ", ".join(f"{1e3 * x:.1f}" for x in centre)
+    at = ", ".join(f"{x:.1f}" for x in np.round(1e3 * centre, 1) + 0.0)
     range_fix = "" if fits else f"Parts are {MIN_SIZE_M:g} to {MAX_SIZE_M:g} m across; check the unit."
     return (
         Check("size", fits, f"It is {sides} mm large.", range_fix),

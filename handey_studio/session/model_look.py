@@ -20,6 +20,7 @@ from handey_studio.modeling.suggestion import Alignment
 GAP_M = 0.03  # between a scan that is not aligned yet and those beside it
 AROUND_M = 0.05  # so much of the support is shown around what stands on it
 FLOOR_NOISES = 4.0
+COMPANY_STEPS = 8.0  # spacings of readings by which neighbours on one surface may differ in depth
 HATCH_M = 0.004
 ASSUMED = "assumed"
 
@@ -125,6 +126,14 @@ def _beside(scans: Sequence[Scan], poses: Sequence[NDArray], scan: Scan) -> NDAr
 
 @lru_cache(maxsize=16)
 def _readings(scan: Scan) -> NDArray:
-    """Readings (n, 3) [m] in the scan's own world."""
+    """Readings (n, 3) [m] in the scan's own world, without those that stand alone in the air: near the eye they would hide the object."""
     points = apply(scan.view.T_world_sensor, scan.view.points_sensor())
-    return frozen_array(points[np.isfinite(points[..., 2])])
+    return frozen_array(points[np.isfinite(points[..., 2]) & _in_company(scan.view.depth, COMPANY_STEPS * spacing_of(scan))])
+
+
+def _in_company(depth: NDArray, step: float) -> NDArray:
+    """Which readings (H, W) have at least two neighbours that are no farther or nearer than `step` [m]."""
+    wide = np.pad(depth, 1, constant_values=np.nan)
+    height, width = depth.shape
+    beside = [wide[1 + j : 1 + j + height, 1 + i : 1 + i + width] for j in (-1, 0, 1) for i in (-1, 0, 1) if (j, i) != (0, 0)]
+    return np.sum([np.abs(other - depth) < step for other in beside], axis=0) >= 2

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from playwright.sync_api import Locator, Page
 
@@ -51,3 +52,12 @@ def says(page: Page, words: str) -> None:
 def pane(page: Page, name: str) -> Locator:
     """A piece of the page by its test id."""
     return page.get_by_test_id(name)
+
+
+def upload(page: Page, button: str, *files: Path) -> None:
+    """Press an upload button and choose a file, for each of the files."""
+    for file in files:
+        with page.expect_file_chooser() as opened:
+            page.get_by_role("button", name=button, exact=True).click()
+        opened.value.set_files(file)
+        time.sleep(3 * PAUSE_S)

@@ -78,7 +78,7 @@ def _about_trial(state: State, scan: Scan) -> tuple[str, str, str]:
     best = found.poses[0]
     times = f"{len(found.poses)} times, best" if len(found.poses) > 1 else "once,"
     words = f"{times} with a probability of {100 * best.score:.0f} % and {1e3 * best.surface_rms_m:.1f} mm rms."
-    return "Found there", words[0].upper() + words[1:], "good"
+    return "Found there", _capital(words), "good"
 
 
 def _about_alignment(state: State, name: str) -> tuple[str, str, str]:
@@ -88,9 +88,17 @@ def _about_alignment(state: State, name: str) -> tuple[str, str, str]:
     offered = proposals(found)
     if found is None or not offered:
         reason = found.reason if found is not None else "the alignment failed"
-        return f"{name} could not be aligned", f"{reason}. Use Align points: pairs of clicks on both scans.", "bad"
+        return f"{_capital(name)} could not be aligned", f"{reason}. Use Align points: pairs of clicks on both scans.", "bad"
     more = f" {len(offered)} poses fit; this is number {state.model.alternative % len(offered) + 1}." if len(offered) > 1 else ""
-    return f"{name} is aligned within {1e3 * found.rms:.2f} mm", f"Shown in another colour. Accept it, or pick points.{more}", "good"
+    return (
+        f"{_capital(name)} is aligned within {1e3 * found.rms:.2f} mm",
+        f"Shown in another colour. Accept it, or pick points.{more}",
+        "good",
+    )
+
+
+def _capital(name: str) -> str:
+    return name[:1].upper() + name[1:]
 
 
 def _about_suggestion(state: State) -> tuple[str, str, str] | None:

@@ -21,6 +21,7 @@ from handey_studio.world import Part
 from handey_studio.world.library import bundled
 from handey_studio.world.part_writing import write_part
 
+TURN = "turn it over (Model, on the left) and find it again (Part, on the right)."
 LIMITS = {"density": (1.0, 25_000.0, "kg/m³"), "friction": (0.01, 2.0, "")}
 
 
@@ -83,6 +84,17 @@ class FindIt:
 
 
 @dataclass(frozen=True)
+class FindAgain:
+    """The localizer looks once more for the part that the model became, for instance after the object was turned over."""
+
+    def run(self, bench: Any) -> State:
+        part = known_part(bench.state)
+        if part is None:
+            raise BadInput("the model is no part of this session yet; press Find it first.")
+        return _looking_for(bench, bench.state, part)
+
+
+@dataclass(frozen=True)
 class UsePart:
     """A part of the library joins the workcell, and the localizer looks for it."""
 
@@ -118,6 +130,12 @@ class PickPart:
         return replace(state, model=replace(state.model, part="" if state.model.part == self.name else self.name))
 
 
+def known_part(state: State) -> Part | None:
+    """The part that the model became in this session, while the model is put aside."""
+    draft = state.session.draft
+    return None if draft is None or state.modelling else state.session.part(draft.name)
+
+
 def modelled_part(state: State) -> Part:
     """The model as a part. Raises BadInput when there is no solid, or it is not one that can be."""
     draft, shown, judged = derived.draft_of(state), derived.built(state), derived.truth(state)
@@ -148,7 +166,7 @@ def found(state: State, session: Session) -> State:
     many = f" {count} times" if count > 1 else ""
     doubts = shown.scene.doubts if shown.scene is not None else {}
     if all(doubts.get(placed.name, 0.0) > MoveOptions().most_doubt for placed in shown.located if placed.part.name == name):
-        return state.told(f'"{name}" was found{many}, but this view does not tell how it stands: turn it over and find it again.', "bad")
+        return state.told(f'"{name}" was found{many}, but this view does not tell how it stands: {TURN}', "bad")
     return state.told(f'"{name}" was found{many}. Press Plan or MOVE.', "good")
 
 

@@ -170,9 +170,9 @@ class ModelPanel:
     def _show_picked(self, state: State) -> None:
         self._typed = typed_options(state) if state.model.tool == SELECT else ()
         shown = derived.built(state)
+        picked_now = state.model.picked if state.modelling else ()
         rows = [
-            (f"Selected {number + 1}" if len(state.model.picked) > 1 else "Selected", snap.of)
-            for number, snap in enumerate(state.model.picked)
+            (f"Selected {number + 1}" if len(state.model.picked) > 1 else "Selected", snap.of) for number, snap in enumerate(picked_now)
         ]
         set_to(self._picked, content=html.facts(rows, "picked") if rows else "")
         set_to(self._form, visible=bool(self._typed))

@@ -10,7 +10,7 @@ import viser
 from handey_studio.app import html, palette
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.look import BY_DISTANCE, BY_SCAN
-from handey_studio.app.modelling.parts import EditPart, FindIt, NameModel, PickPart, SavePart, SetMaterial, UsePart
+from handey_studio.app.modelling.parts import EditPart, FindAgain, FindIt, NameModel, PickPart, SavePart, SetMaterial, UsePart, known_part
 from handey_studio.app.modelling.scanning import UploadScan
 from handey_studio.app.modelling.showing import ColourBy, PointAtCheck
 from handey_studio.app.modelling.steps import EditStep, LookAtStep, RemoveStep
@@ -29,16 +29,20 @@ NONE = -1
 
 
 class PartPanel:
-    """Top to bottom: numbers and grasps, checks, the part, its history, the library."""
+    """Top to bottom: whether it is a part, saving and finding it, numbers and grasps, its history, the library."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._parts: tuple[Part, ...] = ()
         self._step, self._factor, self._chosen = NONE, 1e-3, ""
-        self._numbers = gui.add_html("")
-        self._colours: Any = gui.add_dropdown("Colour readings by", (BY_SCAN, BY_DISTANCE), visible=False)
-        self._checks = gui.add_html("")
+        self._about = gui.add_html("")
+        self._again = gui.add_button(
+            "Find it again", icon=viser.Icon.SEARCH, color=palette.BLUE, visible=False, hint="In the cell as it is now"
+        )
         self._check: Any = gui.add_number("Check picked", NONE, step=1)
         self._add_saving(gui)
+        self._numbers = gui.add_html("")
+        self._colours: Any = gui.add_dropdown("Colour readings by", (BY_SCAN, BY_DISTANCE), visible=False)
+        self._legend = gui.add_html("")
         with gui.add_folder("History", expand_by_default=True) as self._past:
             self._history = gui.add_html("")
             self._row: Any = gui.add_number("Step picked", NONE, step=1)
@@ -82,6 +86,7 @@ class PartPanel:
         on_user(self._friction, send, lambda event: SetMaterial("friction", float(event.target.value)))
         on_click(self._save, send, lambda _: SavePart(self._name.value, bool(self._replace.value)))
         on_click(self._find, send, lambda _: FindIt(self._name.value))
+        on_click(self._again, send, lambda _: FindAgain())
         on_upload(self._trial, send, lambda event: UploadScan(event.target.value.name, event.target.value.content, trial=True))
         on_user(self._picked, send, lambda event: PickPart(self._parts[int(event.target.value) % len(self._parts)].name))
         on_click(self._edit, send, lambda _: EditPart(self._chosen))
@@ -101,11 +106,13 @@ class PartPanel:
     def _show_part(self, state: State) -> None:
         shown, judged, draft = derived.built(state), derived.truth(state), derived.draft_of(state)
         solid = shown is not None and shown.solid is not None
-        set_to(self._numbers, content=numbers_html(state) + grasps_html(derived.grasps(state)) if solid else about_html(state))
-        set_to(self._colours, visible=judged is not None and bool(judged.scans), value=state.model.colours)
-        legend = legend_html(judged) if state.model.colours == BY_DISTANCE else ""
         hidden = html.unseen([element_id(self._check)])
-        set_to(self._checks, content=hidden + legend + findings_html(judged, state.model.check, element_id(self._check)))
+        about = findings_html(judged, state.model.check, element_id(self._check)) if solid else about_html(state)
+        set_to(self._about, content=hidden + about)
+        set_to(self._again, visible=known_part(state) is not None, disabled=state.job is not None)
+        set_to(self._numbers, content=numbers_html(state) + grasps_html(derived.grasps(state)) if solid else "")
+        set_to(self._colours, visible=judged is not None and bool(judged.scans), value=state.model.colours)
+        set_to(self._legend, content=legend_html(judged) if state.model.colours == BY_DISTANCE else "")
         steps = derived.steps(state)
         row = html.unseen([element_id(self._row)])
         set_to(self._history, content=row + history_html(steps, state.model.step, element_id(self._row)))
@@ -155,7 +162,7 @@ def library_parts(library: Library, saves: int) -> tuple[Part, ...]:
 
 def _part_looks(state: State) -> tuple:
     look = state.model
-    known = id(look.worked), look.colours, look.check, look.step, look.material
+    known = id(look.worked), look.colours, look.check, look.step, look.material, id(state.session.parts)
     return (state.loads, look.open, id(state.session.draft), *known, state.job is None, id(state.robot))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from handey_studio.app import html, palette
 from handey_studio.app.modelling import derived
+from handey_studio.app.modelling.parts import known_part
 from handey_studio.app.palette import RESIDUAL, RESIDUAL_AT, css
 from handey_studio.app.scene.modelling.scans import distance_limit
 from handey_studio.app.state import State
@@ -41,14 +42,14 @@ def numbers_html(state: State) -> str:
     rows.append(("Faces", f"{len(shown.solid.faces)}, {assumed} of them assumed" if assumed else f"{len(shown.solid.faces)}, none assumed"))
     rows += truth_facts(judged)
     if found is not None:
-        rows.append(("The hand can grasp", _grasp_words(found)))
+        rows.append(("Grasps", _grasp_words(found)))
     return html.facts(rows, "part-numbers")
 
 
 def _grasp_words(found: Graspable) -> str:
     if found.classes:
         classes, groups = len(found.classes), found.group_count
-        return f"{classes} grasp class{'es'[: 2 * (classes != 1)]}, {groups} approach group{'s'[: groups != 1]}"
+        return f"{classes} class{'es'[: 2 * (classes != 1)]}, {groups} approach group{'s'[: groups != 1]}"
     miss = found.nearest_miss
     return f"nothing: {describe(miss)}" if miss is not None else "nothing: no two features lie opposite one another"
 
@@ -60,33 +61,34 @@ def about_html(state: State) -> str:
         return html.empty(NO_MODEL, "part-empty")
     if state.modelling:
         return html.empty(NO_SOLID, "part-empty")
-    known = draft.name in state.session.workcell.parts
-    words = f'Its part "{draft.name}" is in the workcell; Move, on the left, has it. ' if known else ""
+    words = f'Its part "{draft.name}" is in the workcell; Move, on the left, has it. ' if known_part(state) is not None else ""
     return html.card(
         "The model is put aside", f"{words}Continue the model (left, Model) to look at it or change it.", "quiet", "part-aside"
     )
 
 
 def solid_facts(solid: Polyhedron, density: float) -> list[tuple[str, str]]:
-    """What a solid measures [mm] along its own sides, and what it weighs."""
+    """What a solid measures [mm] along its own sides, and what it weighs; its centre of mass from the middle of what it stands on."""
+    axes = _own_axes(solid)
     volume, centre = solid.volume_and_centroid
-    size = " × ".join(f"{1e3 * side:.1f}" for side in extents(solid))
+    low, high = (solid.vertices @ axes.T).min(axis=0), (solid.vertices @ axes.T).max(axis=0)
+    size = " × ".join(f"{1e3 * side:.1f}" for side in high - low)
+    off = axes @ centre - ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2])
     return [
         ("Size", f"{size} mm"),
         ("Volume", f"{1e6 * volume:.2f} cm³"),
         ("Mass", f"{1e3 * density * volume:.1f} g"),
-        ("Centre of mass", ", ".join(f"{1e3 * x:.1f}" for x in centre) + " mm"),
+        ("Centre of mass", f"{', '.join(f'{x:.1f}' for x in np.round(1e3 * off, 1) + 0.0)} mm from the middle of its base"),
     ]
 
 
-def extents(solid: Polyhedron) -> np.ndarray:
-    """Extents (3,) [m] along the longest level edge, level across it, and upright."""
+def _own_axes(solid: Polyhedron) -> np.ndarray:
+    """Rows (3, 3): along the longest level edge, level across it, and upright."""
     ways = np.array([solid.vertices[edge.end] - solid.vertices[edge.start] for edge in solid.edges])
     level = ways[np.abs(ways[:, 2]) < 1e-4 + 1e-3 * np.linalg.norm(ways, axis=1)]
     x = level[int(np.argmax(np.linalg.norm(level, axis=1)))] if len(level) else np.array([1.0, 0.0, 0.0])
     x = np.array([x[0], x[1], 0.0]) / np.hypot(x[0], x[1])
-    axes = np.stack([x, np.array([-x[1], x[0], 0.0]), np.array([0.0, 0.0, 1.0])])
-    return np.ptp(solid.vertices @ axes.T, axis=0)
+    return np.stack([x, np.array([-x[1], x[0], 0.0]), np.array([0.0, 0.0, 1.0])])
 
 
 def truth_facts(judged: Truth | None) -> list[tuple[str, str]]:
@@ -95,7 +97,7 @@ def truth_facts(judged: Truth | None) -> list[tuple[str, str]]:
         return []
     rows = [
         ("Residual", f"{1e3 * judged.rms:.2f} mm rms"),
-        ("Explained", f"{100 * judged.explained:.0f} % of the readings, within 3 noises"),
+        ("Explained", f"{100 * judged.explained:.0f} % of the readings"),
         ("Surface seen", f"{100 * judged.seen:.0f} %"),
     ]
     through = [scan for scan in judged.scans if scan.seen_through > TOLD_THROUGH]
