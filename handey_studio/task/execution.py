@@ -57,7 +57,7 @@ def carry_out(order: Order, scene: Scene, planned: MoveResult, cell: Cell, progr
         begun, number = time.perf_counter(), len(attempts) + 1
         share = Share(progress, (number - 1) / most, number / most)
         tried = _tried(order, scene, plan, cell, _felt(attempts), Share(share, 0.0, ACTING))
-        entry = _note(tried, plan, number, ledger)
+        tried, entry = _noted(tried, plan, number, ledger)
         now = _with_time(now, "execute", time.perf_counter() - begun)
         if tried.incident is None:
             return Outcome(_ended(now, tried, "done", _said(tried), attempts, ledger, cell), scene, tried.after)
@@ -65,7 +65,7 @@ def carry_out(order: Order, scene: Scene, planned: MoveResult, cell: Cell, progr
         ledger.add("recovery", "; ".join((*tried.back.actions, lesson.why)), parent=entry)
         if lesson.hopeless:
             return Outcome(_ended(now, tried, "failed", _why(attempts, tried, lesson), attempts, ledger, cell), scene, tried.after)
-        attempts.append(_kept(plan, tried, lesson, len(attempts)))
+        attempts.append(_kept(scene, plan, tried, lesson, len(attempts)))
         begun = time.perf_counter()
         scene, again = _anew(order, scene, attempts, tried, cell, Share(share, ACTING, 1.0))
         ledger.adopt(again.ledger, parent=ledger.add("planned anew", f"after attempt {number}", again.reason or None))
@@ -144,10 +144,11 @@ def _same(before: Scene, now: Scene, last: Attempt) -> str | None:
     return nearest.name if nearest is not None else None
 
 
-def _kept(plan: MovePlan, tried: Tried, lesson: Lesson, count: int) -> Attempt:
+def _kept(scene: Scene, plan: MovePlan, tried: Tried, lesson: Lesson, count: int) -> Attempt:
     incident = tried.incident or Incident("stopped", -1, "")
     felt = replace(tried.felt, name=f"felt {count + 1}") if tried.felt is not None else None
-    return Attempt(plan, tried.performance, Recovery(incident, lesson.why, tried.back.actions, lesson.ruled_out, felt))
+    recovery = Recovery(incident, lesson.why, tried.back.actions, lesson.ruled_out, felt)
+    return Attempt(plan, tried.performance, recovery, scene.depth_map, scene.instances)
 
 
 def _felt(attempts: list[Attempt]) -> tuple[Block, ...]:
@@ -158,18 +159,22 @@ def _ruled_out(attempts: list[Attempt]) -> tuple[RuledOut, ...]:
     return tuple(one.recovery.ruled_out for one in attempts if one.recovery.ruled_out is not None)
 
 
-def _note(tried: Tried, plan: MovePlan, number: int, ledger: Ledger) -> int:
-    """The attempt in the ledger, its steps below it."""
+def _noted(tried: Tried, plan: MovePlan, number: int, ledger: Ledger) -> tuple[Tried, int]:
+    """The attempt written into the ledger, its steps below it: its incidents know their entries then, and the id of its own."""
     entry = ledger.add("attempt", f"{number}: {plan.part}")
     done = {one.step for one in tried.performance.performed}
     steps = {k: ledger.add("step", plan.steps[k].kind, parent=entry) for k in sorted(done) if k >= 0}
+    told = []
     for incident in tried.performance.incidents:
         at = steps.get(incident.step) if not incident.overcome else None
         below = ledger.add("incident", incident.kind, parent=entry) if at is None else at
         ledger.fall(below, incident.sentence, value=incident.value, limit=incident.limit, unit=incident.unit)
+        told.append(replace(incident, entry=below))
     if tried.performance.check is not None:
         ledger.add("check", tried.performance.check.sentence, parent=entry)
-    return entry
+    performance = replace(tried.performance, incidents=tuple(told))
+    ended = next((one for one in told if tried.incident is not None and replace(one, entry=-1) == tried.incident), tried.incident)
+    return replace(tried, performance=performance, incident=ended), entry
 
 
 def _ended(

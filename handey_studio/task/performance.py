@@ -34,7 +34,8 @@ class Incident:
     """Something that went otherwise than planned, noticed at plan step `step`: -1 before the first, the number of steps after the last.
 
     `value` is what was measured and `limit` what it was held against, in `unit` as in the ledger; `sentence` tells it to a person. One
-    that was `overcome` on the spot did not end the attempt.
+    that was `overcome` on the spot did not end the attempt. `entry` is the id of the result's ledger entry that tells of it, -1 before that
+    is written.
     """
 
     kind: IncidentKind
@@ -44,6 +45,7 @@ class Incident:
     limit: float | None = None
     unit: str = ""
     overcome: bool = False
+    entry: int = -1
 
     def __str__(self) -> str:
         number = "" if self.value is None else f": {measured(self.value, self.unit)}"

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from handey_studio.base import Entry, Value, frozen_array
 from handey_studio.grasping import BumpRun, ForbiddenRange, Grip
 from handey_studio.motion import Certificate, CSpaceSummary
+from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.task.performance import Check, Incident, Performance, Recovery
+from handey_studio.world import PlacedPart
 
 StepKind = Literal["free", "approach", "close", "lift", "transfer", "regrasp", "place", "open", "retreat"]
 
@@ -135,11 +137,14 @@ class MovePlan(Value):
 
 @dataclass(frozen=True, eq=False)
 class Attempt(Value):
-    """A plan that was carried out and did not end well: how it went, and what was decided then."""
+    """A plan that was carried out and did not end well: how it went, and what was decided then. `scan` is what it was made on, with the
+    instances `located` in it; None and empty in sessions of earlier versions."""
 
     plan: MovePlan
     performance: Performance
     recovery: Recovery
+    scan: DepthMap | None = None
+    located: tuple[PlacedPart, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
