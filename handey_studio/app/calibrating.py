@@ -18,10 +18,11 @@ from handey_studio.session.run import station_of
 from handey_studio.task.calibrate import CalibrateOptions, RangeCalibration, calibrate_range
 from handey_studio.world import Library
 
-MOST_OFF_M, MOST_TURN_RAD = 0.009, np.deg2rad(1.5)  # of a misplacement that is drawn by chance
+MOST_OFF_M = np.array([0.009, 0.009, 0.0003])  # of a misplacement that is drawn by chance: a table that seems to rise forbids every MOVE
+MOST_TURN_RAD = np.deg2rad(1.5)
 
 MISPLACED = (
-    f"The range finder was moved by up to {1e3 * MOST_OFF_M:.0f} mm along each axis and turned by up to {np.rad2deg(MOST_TURN_RAD):.1f}°. "
+    f"The range finder was moved by up to {1e3 * MOST_OFF_M[0]:.0f} mm each way and turned by up to {np.rad2deg(MOST_TURN_RAD):.1f}°. "
     "MOVE to see what comes of it, then calibrate: that tells how far it was."
 )
 MISPLACED_HINT = "The simulated range finder is moved and turned by chance; by how much, calibrating tells"

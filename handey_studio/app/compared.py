@@ -21,9 +21,9 @@ def is_misplaced(state: State) -> bool:
 
 
 def with_outcome(state: State) -> State:
-    """The state that remembers the numbers of the MOVE that was just carried out: they outlive its result."""
+    """The state that remembers the numbers of the MOVE that was just tried: they outlive its result."""
     result = state.session.result
-    if result is None or not result.performances:
+    if result is None:
         return state
     return replace(state, outcomes=(*state.outcomes, outcome_of(state, result))[-MOST_OUTCOMES:])
 
@@ -34,7 +34,8 @@ def outcome_of(state: State, result: MoveResult) -> Outcome:
     seen = None if check is None or check.off_m is None or check.off_rad is None else (check.off_m, check.off_rad)
     noticed = sum(len(performance.incidents) for performance in result.performances)
     said = f"{result.command.part} → {result.command.to}"
-    return Outcome(is_misplaced(state), said, result.status, len(result.performances), noticed, seen, truly_off(state.session, result))
+    off = truly_off(state.session, result) if result.performances else None
+    return Outcome(is_misplaced(state), said, result.status, result.reason, len(result.performances), noticed, seen, off)
 
 
 def truly_off(session: Session, result: MoveResult) -> tuple[float, float] | None:

@@ -59,4 +59,4 @@ def _way_out(reason: str) -> str:
 
 def _sentence(reason: str) -> str:
     """A reason as a sentence of its own."""
-    return f"{reason.rstrip('.')}."
+    return f"{reason[:1].upper()}{reason[1:].rstrip('.')}."

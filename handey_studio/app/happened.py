@@ -5,9 +5,11 @@ from typing import Literal
 
 import numpy as np
 
+from handey_studio.app.ledger_commands import LookAtEntry
 from handey_studio.app.playback import LookAtAttempt
 from handey_studio.app.state import State
 from handey_studio.session import Told, replay_of, seconds_of
+from handey_studio.session.ledger_tree import ROOT
 from handey_studio.task.performance import Check, Incident, Recovery
 from handey_studio.task.plan import MoveResult
 from handey_studio.world import Robot
@@ -19,24 +21,28 @@ Kind = Literal["incident", "overcome", "decision", "given up", "check", "unsure"
 
 @dataclass(frozen=True)
 class Happening:
-    """One row: at `time_s` of an attempt (both from 0)."""
+    """One row: at `time_s` of an attempt (both from 0), with the entry of the ledger that tells of it, `ROOT` for none."""
 
     kind: Kind
     attempt: int
     time_s: float
     title: str
     sentence: str
+    entry: int = ROOT
 
 
 @dataclass(frozen=True)
 class LookAtHappening:
-    """Look at the moment of a row."""
+    """Look at the moment of a row; the ledger opens at its entry."""
 
     row: int
 
     def apply(self, state: State) -> State:
         rows = happenings(state)
-        return LookAtAttempt(rows[self.row].attempt, rows[self.row].time_s).apply(state) if 0 <= self.row < len(rows) else state
+        if not 0 <= self.row < len(rows):
+            return state
+        row = rows[self.row]
+        return LookAtEntry(row.entry).apply(LookAtAttempt(row.attempt, row.time_s).apply(state))
 
 
 def happenings(state: State) -> tuple[Happening, ...]:
@@ -72,7 +78,8 @@ def _step_name(told: Told, step: int) -> str:
 def _incident(attempt: int, time_s: float, where: str, incident: Incident) -> Happening:
     kind: Kind = "overcome" if incident.overcome else "incident"
     more = "; overcome on the spot" if incident.overcome else ""
-    return Happening(kind, attempt, time_s, f"{incident.kind[:1].upper()}{incident.kind[1:]}, {where}", f"{incident}{more}.")
+    title = f"{incident.kind[:1].upper()}{incident.kind[1:]}, {where}"
+    return Happening(kind, attempt, time_s, title, f"{incident}{more}.", incident.entry)
 
 
 def _decision(attempt: int, time_s: float, recovery: Recovery) -> Happening:

@@ -63,13 +63,13 @@ class JobDone:
             return state
         if state.job.done is not None:
             return state.job.done(replace(state, job=None), self.session)
-        session = merged(state.session, self.session)
+        session, executed = merged(state.session, self.session), state.job.execute
         state = replace(state, session=session, job=None, ledger_at=ROOT, ledger_page=0, ledger_entry=ROOT)
         state = with_view(state, time_s=0.0, result=-1, attempt=0)
         result = session.result
         if result is None:
             return state
-        state = with_outcome(state)
+        state = with_outcome(state) if executed and result.reason != CANCELLED else state
         kind = KINDS[result.status] if result.reason != CANCELLED else "info"
         return replace(state, playing=state.replay is not None).told(outcome(result), kind)
 

@@ -62,6 +62,23 @@ class LedgerPage:
 
 
 @dataclass(frozen=True)
+class LookAtEntry:
+    """Look at an entry among the branches that it stands with, whatever was searched for before."""
+
+    number: int
+
+    def apply(self, state: State) -> State:
+        entry = next((entry for entry in ledger_of(state) if entry.id == self.number), None)
+        if entry is None:
+            return state
+        above = path_to(ledger_of(state), entry.id)[:-1]
+        at = above[-1].id if above else ROOT
+        page = children_of(ledger_of(state))[at].index(entry) // LEDGER_ROWS
+        state = replace(state, ledger_stage="", ledger_only="all", ledger_words="")
+        return replace(state, ledger_at=at, ledger_page=page, ledger_entry=entry.id)
+
+
+@dataclass(frozen=True)
 class LookAtNoEntry:
     """The scene shows the plan again, not what fell."""
 

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 import viser
 
 from handey_studio.app import palette
+from handey_studio.app.looking_back import looking_back
 from handey_studio.app.modelling.aside import aside
 from handey_studio.app.page_style import PAGE
 from handey_studio.app.panels.cell import CellPanel
@@ -75,7 +76,7 @@ class View:
 
     def render(self, old: State | None, new: State) -> tuple[str, ...]:
         """Draw what differs. A pane that breaks down is left as it is, logged, and its name returned: the others are drawn all the same."""
-        of_move = (None if old is None else aside(old), aside(new))
+        of_move = (None if old is None else aside(looking_back(old)), aside(looking_back(new)))
         broken = []
         with self._server.atomic():
             for pane, states in [*((pane, of_move) for pane in self._of_move), *((pane, (old, new)) for pane in self._panes)]:

@@ -16,6 +16,11 @@ from handey_studio.localization import Hypothesis
 from handey_studio.session import ViewState
 
 CLOSE_UP = 2.6  # diameters of a part from which one looks at it
+NEEDS_PLAN = {
+    "Grasp": "There is no grasp to look at yet; press Plan first.",
+    "Hand": "There is no way of the hand to look at yet; press Plan first.",
+    "C-space": "There is no configuration space to look at yet; press Plan first.",
+}
 NEAR_M = 0.03  # a camera that looks no farther past a hypothesis looks at it
 
 
@@ -27,6 +32,10 @@ class LookFrom:
     client: int | None
 
     def run(self, bench: Bench) -> State:
+        if self.view in NEEDS_PLAN and bench.state.replay is None:
+            return bench.state.told(NEEDS_PLAN[self.view], client=self.client)
+        if self.view == "Hypothesis" and bench.state.hypothesis is None:
+            return bench.state.told("No hypothesis is looked at; press N, or choose one under Located.", client=self.client)
         position, look_at = viewpoint(self.view, bench.state)
         bench.look(position, look_at, self.client)
         return ShowLayer(CSPACE, True).apply(bench.state) if self.view == "C-space" else bench.state

@@ -90,14 +90,16 @@ const pressTab = (label) => {
   }
   return tab;
 };
-const kept = REMEMBERED ? JSON.parse(sessionStorage.getItem('tabs in front') || 'null') : null;
-let wanted = kept || LABELS, tries = 0;
+const keep = () => sessionStorage.setItem('tabs in front', JSON.stringify(
+  [...document.querySelectorAll('[role=tab][aria-selected=true]')].map(tab => tab.textContent.trim())));
+const known = REMEMBERED ? JSON.parse(sessionStorage.getItem('tabs in front') || '[]') : [];
+let wanted = known.length ? known : LABELS, tries = 0;
 const waiting = setInterval(() => {
   wanted = wanted.filter(label => !pressTab(label));
-  if (!wanted.length || ++tries > 100) clearInterval(waiting);
+  if (wanted.length && ++tries <= 100) return;
+  clearInterval(waiting);
+  window.onpagehide = keep;
 }, 100);
-window.onpagehide = () => sessionStorage.setItem('tabs in front', JSON.stringify(
-  [...document.querySelectorAll('[role=tab][aria-selected=true]')].map(tab => tab.textContent.trim())));
 """  # a tab of a docked panel answers to keys and to the pointer, not to a plain click; the key must not reach the page's shortcuts
 
 

@@ -25,6 +25,7 @@ from handey_studio.app.planner import Failed, Finished, Planner, Progressed, Run
 from handey_studio.app.playback import Tick
 from handey_studio.app.scene.units import SCALE, metres
 from handey_studio.app.state import State, opened
+from handey_studio.app.tabs import front_tabs, tabs_with_news
 from handey_studio.app.view import View
 from handey_studio.app.wire import show_tabs
 from handey_studio.base import BadInput
@@ -197,20 +198,6 @@ class Workbench:
         camera.position = tuple(position * SCALE)
         camera.look_at = tuple(look_at * SCALE)
         camera.fov = FIELD_OF_VIEW_RAD
-
-
-def front_tabs(state: State) -> tuple[str, str]:
-    """The tabs of the left and the right panel that go with what is done now."""
-    return ("Model", "Part") if state.model.open else ("Move", "Result")
-
-
-def tabs_with_news(old: State, new: State) -> tuple[str, ...]:
-    """The tabs to bring to the front after a step: those of the model or the MOVE that one turns to, the result of what was carried out."""
-    if old.model.open != new.model.open:
-        return front_tabs(new)
-    result = new.session.result
-    carried_out = old.job is not None and new.job is None and result is not None and result is not old.session.result
-    return ("Result",) if carried_out and result is not None and result.performances else ()
 
 
 def heard(message: Any) -> Any:

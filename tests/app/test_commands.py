@@ -204,7 +204,7 @@ def test_every_state_says_what_to_do_next(fresh, full):
     no_plan = replace(full, session=replace(full.session, results=(failed,)))
     titles = [next_step(s)[0] for s in (fresh, full, bare, no_plan, JobStarted(True).apply(full), SetDestination("0,0,0").apply(full))]
     assert len(set(titles)) == len(titles)
-    assert "no grasp." in next_step(no_plan)[1]
+    assert "No grasp." in next_step(no_plan)[1]
 
 
 def tree_of(full):

@@ -9,14 +9,17 @@ import pytest
 
 from handey_studio.app import autosave
 from handey_studio.app.autosave import Autosave, LetGo, Offer, TakeUp, left_behind, own_copy
+from handey_studio.app.browsing import ledger_page
 from handey_studio.app.calibrating import AcceptCalibration, Misplace, calibration_done
 from handey_studio.app.commands import Redo, Undo
-from handey_studio.app.compared import is_misplaced
-from handey_studio.app.disturbing import KINDS, AddFault, ClearFaults, SetPhysics, words_of
+from handey_studio.app.compared import is_misplaced, with_outcome
+from handey_studio.app.disturbing import KINDS, AddFault, ClearFaults, SetPhysics, which_words, words_of
 from handey_studio.app.exporting import exported
 from handey_studio.app.happened import LookAtHappening, happenings
 from handey_studio.app.jobs import JobDone, JobShows, JobStarted
-from handey_studio.app.panels.calibration import found_html, residuals_svg
+from handey_studio.app.ledger_commands import FilterLedger
+from handey_studio.app.looking_back import looking_back
+from handey_studio.app.panels.calibration import found_html, off_words, outcomes_html, residuals_svg
 from handey_studio.app.panels.commands import commands_html
 from handey_studio.app.panels.running import happened_html
 from handey_studio.app.panels.timeline import now_playing
@@ -34,7 +37,9 @@ from handey_studio.app.sequence import (
 from handey_studio.app.setting_up import SetAttempts, SetDestination, SetImprove, SetSeed
 from handey_studio.app.state import opened, with_view
 from handey_studio.app.svg_plots import cursor, plots_html, plots_of
+from handey_studio.app.tabs import tabs_with_news
 from handey_studio.base import BadInput
+from handey_studio.cell.workcell import TrueBody
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.sensing.frame_fit import FrameFit
 from handey_studio.session import CommandState, session_to_bytes, write_session
@@ -340,3 +345,67 @@ def test_a_copy_that_waits_is_written_when_the_workbench_ends(tmp_path):
     keeper.stop()
     assert own_copy(state.library).exists()
     assert with_view(state, time_s=1.0).unsaved and Seek(0.0).apply(state).unsaved
+
+
+def test_a_click_on_an_incident_opens_its_entry_in_the_ledger(done):
+    result = done.session.results[0]
+    first = result.attempts[0]
+    entry = next(entry for entry in result.ledger if entry.parent is not None)
+    incident = replace(first.performance.incidents[0], entry=entry.id)
+    attempt = replace(first, performance=replace(first.performance, incidents=(incident,)))
+    state = with_result(done, replace(result, attempts=(attempt,)))
+    state = LookAtHappening(0).apply(FilterLedger(words="nothing has this").apply(state))
+    assert state.entry == entry and entry in ledger_page(state)
+    assert LookAtHappening(1).apply(done).entry is None, "a decision has no entry of its own"
+
+
+def test_an_earlier_attempt_is_looked_at_on_its_own_scan(done):
+    result, scene = done.session.results[0], done.session.scene
+    then = replace(scene.depth_map, elevation=scene.depth_map.elevation + 0.01)
+    attempt = replace(result.attempts[0], scan=then, located=scene.instances[:1])
+    state = with_result(done, replace(result, attempts=(attempt,)))
+    before = LookAtAttempt(0).apply(state)
+    shown = looking_back(before).session.scene
+    assert shown.depth_map == then and shown.instances == scene.instances[:1] and not shown.located.edges
+    assert looking_back(Seek(1.0).apply(before)).session.scene is shown, "it is made once, not each frame"
+    assert looking_back(LookAtAttempt(1).apply(state)).session.scene is scene
+
+
+def with_result(state, result):
+    return replace(state, session=replace(state.session, results=(result,)))
+
+
+def test_moves_before_and_after_a_calibration_stand_side_by_side(done):
+    result, session = done.session.results[0], done.session
+    goal = result.plan.T_world_part_goal
+    part = session.workcell.parts[0]
+    really = TrueBody("it", from_xyz_rpy((0.003, 0.0, 0.004)) @ goal, part=part)
+    state = replace(done, session=replace(session, cell_now=replace(session.workcell.setup, bodies=(really,))))
+    state = with_outcome(state)
+    said = off_words(state.outcomes[0].truly_off)
+    assert (state.outcomes[0].status, state.outcomes[0].attempts) == ("done", 2) and said.startswith("5.0 mm, 0.0°")
+    state = with_outcome(Misplace(True).apply(state))
+    assert len(state.outcomes) == 1 and not state.outcomes[0].misplaced, "what was found before went"
+    shown = outcomes_html((*state.outcomes, replace(state.outcomes[0], misplaced=True, status="failed", reason="<b>slipped</b>")))
+    assert shown.index("misplaced") < shown.index("in place") and "&lt;b&gt;slipped" in shown and "0.4 mm, 0.1°" in shown
+
+
+def test_what_goes_when_the_range_finder_is_moved_is_said(done, state):
+    assert "went with it" in Misplace(True).apply(done).notices[-1].text
+    assert "went with it" not in Misplace(True).apply(state).notices[-1].text
+
+
+def test_which_motion_a_number_means_is_told_from_the_plan(done):
+    plan = done.attempt.plan
+    told = {call: which_words(plan, call).split(": ")[1] for call in ("grip", "follow", "descend")}
+    assert "close" in told["grip"] and "transfer" in told["follow"] and "close" not in told["follow"]
+    names = {name for words in told.values() for name in re.findall(r"\d+ (\w+)", words)}
+    assert names == {step.kind for step in plan.steps} and "4 transfer" in which_words(None, "follow")
+
+
+def test_the_result_comes_to_the_front_when_a_move_was_carried_out(done, state):
+    working = JobStarted(True).apply(state)
+    assert tabs_with_news(working, done) == ("Result",)
+    assert tabs_with_news(done, TogglePlay().apply(done)) == () and tabs_with_news(state, working) == ()
+    modelling = replace(state, model=replace(state.model, open=True))
+    assert tabs_with_news(state, modelling) == ("Model", "Part") and tabs_with_news(modelling, state) == ("Move", "Result")

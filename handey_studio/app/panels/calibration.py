@@ -75,7 +75,7 @@ def outcomes_html(outcomes: Sequence[Outcome]) -> str:
     if not outcomes:
         return ""
     head = _row(("range finder", "MOVE", "tries", "noticed", "seen off", "truly off"), "color:#6b7684")
-    rows = "".join(_row(_words(one)) for one in reversed(outcomes))
+    rows = "".join(_row(_words(one)) + _why(one) for one in reversed(outcomes))
     note = "Off its command, as the scan afterwards saw it, and truly: known only because the cell is simulated."
     style = "margin:2px 14px 6px;font-size:11.5px;line-height:1.35;font-variant-numeric:tabular-nums"
     table = f'<table>{head}{rows}</table><div style="color:#6b7684">{note}</div>'
@@ -85,6 +85,10 @@ def outcomes_html(outcomes: Sequence[Outcome]) -> str:
 def _words(one: Outcome) -> tuple[str, ...]:
     where = "misplaced" if one.misplaced else "in place"
     return where, one.status, str(one.attempts), str(one.noticed), off_words(one.seen_off), off_words(one.truly_off)
+
+
+def _why(one: Outcome) -> str:
+    return f'<tr><td></td><td colspan="5" style="color:#6b7684">{html.esc(one.reason)}</td></tr>' if one.status == "failed" else ""
 
 
 def _row(words: Sequence[str], look: str = "") -> str:
