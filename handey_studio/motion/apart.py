@@ -1,52 +1,61 @@
 """The proof that there is no path: start and goal stay apart although nothing but wholly blocked cells is taken out.
 
 A cell is wholly blocked when a ball inside a link up to the wrist's carrier surely meets something solid at every configuration of the
-cell. What the wrist carries, the depth map and the arm itself are passed over: no way is refused that might be there.
+cell. What the wrist carries and the arm itself are passed over, and of what a held joint turns all but the balls around its axis: no way is
+refused that might be there.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 
+from handey_studio.geometry.transforms import inverse
 from handey_studio.motion.configuration_space import TURN, Extent
 from handey_studio.motion.cores import share
 from handey_studio.motion.distance_field import faces_by_direction
 from handey_studio.motion.forbidden_ranges import product, turned
+from handey_studio.motion.inner_balls import InnerBalls, inner_balls, unturned
 from handey_studio.motion.query import Query
 from handey_studio.motion.regions import Regions, free_regions
-from handey_studio.motion.turning import Between, hinges_of
-from handey_studio.motion.wrist_box import balls_around
+from handey_studio.motion.turning import hinges_of
 from handey_studio.world import Robot, World
 from handey_studio.world.collision import collision_model
-from handey_studio.world.collision_bodies import robot_pieces
+from handey_studio.world.collision_bodies import TABLE_SKIN_M
 
 STEP_RAD = float(np.deg2rad(2.5))
-DIE_M = 0.06
-LEAST_M = 0.02  # smaller balls prove next to nothing
+WIDE_M = (0.0, 0.02, 0.04, 0.08)
 
 
-class InnerBalls(NamedTuple):
-    """Balls inside the links: centres (k, 3) [m] in the frame of the link that arm joint `stage` (k,) carries, radii (k,) [m]."""
+class Ground(NamedTuple):
+    """The depth map as the proof sees it: `tops` (4, ny, nx) [m] in its range frame, the first as they are, the others the least ones as
+    far around as `WIDE_M` tells; minus infinity beyond the map and where it is no higher than the table. Columns are `cell` [m] wide;
+    `highest` [m] is the highest top in the world.
+    """
 
-    centres: NDArray
-    radii: NDArray
-    stage: NDArray
+    tops: NDArray
+    cell: float
+    T_range_world: NDArray
+    highest: float
 
 
 def surely_apart(query: Query) -> bool:
-    """Whether it is proved that no path joins start and goal. Never for arms that hold a joint before the wrist's carrier."""
+    """Whether it is proved that no path joins start and goal."""
     robot = query.world.robot
-    if (robot.held_index < robot.carrier).any():
-        return False
-    extent = _whole_extent(robot)
-    blocked = extent.of_one_turn(wholly_blocked(query.world))
-    regions = free_regions(blocked[None])
+    extent, regions = _whole_extent(robot), _loose_regions(query.world)
     places = (np.array([query.start, query.goal])[:, robot.arm_index] - extent.lower) / STEP_RAD
     cells = np.clip(np.floor(places).astype(int), 0, np.array(extent.counts) - 1)
     start, goal = (_region_at(regions, cell) for cell in cells)
     return start > 0 and goal > 0 and start != goal
+
+
+@lru_cache(maxsize=8)
+def _loose_regions(world: World) -> Regions:
+    """The regions of the cells that are not wholly blocked, kept in this process: other questions in the same world share them."""
+    return free_regions(_whole_extent(world.robot).of_one_turn(wholly_blocked(world))[None])
 
 
 def _whole_extent(robot: Robot) -> Extent:
@@ -63,33 +72,33 @@ def _region_at(regions: Regions, cell: NDArray) -> int:
 
 
 def wholly_blocked(world: World) -> NDArray:
-    """Cells (n1, n2, n3), within the limits up to one turn, in all of which a link up to the carrier meets something known and solid."""
+    """Cells (n1, n2, n3), within the limits up to one turn, in all of which a link up to the carrier meets something solid."""
     robot = world.robot
     turn = round(TURN / STEP_RAD)
     first, second, third = (centres[:turn] for centres in _whole_extent(robot).centres)
-    hinges, balls = hinges_of(robot, Between((), ())), inner_balls(robot)
+    hinges, balls = hinges_of(robot, unturned(robot)), inner_balls(robot)
     planes, starts = _solids(world)
+    ground = _ground(world)
     blocked = np.zeros((len(first), len(second), len(third)), bool)
     frames = np.array([hinges.T_world_first, hinges.T_first_second, hinges.T_second_third])
-    share(lambda mine: _mark(frames, hinges.axes, balls, planes, starts, first, second, third, STEP_RAD / 2, mine, blocked), len(first))
+    share(
+        lambda mine: _mark(frames, hinges.axes, balls, planes, starts, ground, first, second, third, STEP_RAD / 2, mine, blocked),
+        len(first),
+    )
     return blocked
 
 
-def inner_balls(robot: Robot) -> InnerBalls:
-    """Balls inside the links from the first arm joint's to the carrier."""
-    centres, radii, stages = [], [], []
-    for piece in robot_pieces(robot):
-        stage = int(np.searchsorted(robot.arm_index, piece.link)) - 1
-        if stage < 0 or piece.link > robot.carrier:
-            continue
-        planes, _ = faces_by_direction(piece.corners)
-        for centre in balls_around(piece.corners, DIE_M)[0]:
-            depth = -float((planes[:, :3] @ centre + planes[:, 3]).max())
-            if depth > LEAST_M:
-                centres.append(centre)
-                radii.append(depth)
-                stages.append(stage)
-    return InnerBalls(np.array(centres).reshape(-1, 3), np.array(radii, float), np.array(stages, np.int64))
+def _ground(world: World) -> Ground:
+    """The depth map; no column at all without one."""
+    field = world.terrain
+    if field is None:
+        return Ground(np.empty((len(WIDE_M), 0, 0)), 1.0, np.eye(4), -np.inf)
+    base, cell = float(field.T_world_range[2, 3]), float(field.cell)
+    top = np.where(np.isnan(field.top), np.inf, field.top)
+    top = np.where(top + base > world.table_z + TABLE_SKIN_M, top, -np.inf)
+    around = [1 if not wide else 2 * int(np.ceil(wide / cell)) + 1 for wide in WIDE_M]
+    tops = np.array([minimum_filter(top, size, mode="constant", cval=-np.inf) for size in around])
+    return Ground(tops, cell, np.array(inverse(field.T_world_range)), float(top.max(initial=-np.inf)) + base)
 
 
 def _solids(world: World) -> tuple[NDArray, NDArray]:
@@ -97,6 +106,38 @@ def _solids(world: World) -> tuple[NDArray, NDArray]:
     solids = collision_model(world).solids
     faces = [faces_by_direction(solids.corners[a:b])[0] for a, b in zip(solids.first[:-1], solids.first[1:], strict=True)]
     return np.concatenate([np.empty((0, 4)), *faces]), np.cumsum([0] + [len(planes) for planes in faces])
+
+
+@njit(cache=True)
+def _meets_ground(ground: Ground, x: float, y: float, z: float, reach: float) -> bool:
+    """Whether a ball surely holds a point of a column: its lowest point, eight amid its sides below or eight around its waist.
+
+    With a negative `reach` [m] the centre must be as deep among columns as high.
+    """
+    if z - reach >= ground.highest:
+        return False
+    if reach <= 0.0:
+        for level in range(1, len(WIDE_M)):
+            if -reach <= WIDE_M[level]:
+                return _below_top(ground, level, x, y, z - reach)
+        return False
+    if _below_top(ground, 0, x, y, z - reach):
+        return True
+    for down, out in ((0.7 * reach, 0.7 * reach), (0.0, reach)):
+        for k in range(8):
+            if _below_top(ground, 0, x + out * np.cos(k * np.pi / 4), y + out * np.sin(k * np.pi / 4), z - down):
+                return True
+    return False
+
+
+@njit(cache=True)
+def _below_top(ground: Ground, level: int, x: float, y: float, z: float) -> bool:
+    """Whether a point of the world is lower than the top of its column, which is wide as `level` tells."""
+    T = ground.T_range_world
+    i = int(np.floor((T[0, 0] * x + T[0, 1] * y + T[0, 3]) / ground.cell))
+    j = int(np.floor((T[1, 0] * x + T[1, 1] * y + T[1, 3]) / ground.cell))
+    inside = 0 <= i < ground.tops.shape[2] and 0 <= j < ground.tops.shape[1]
+    return inside and z + T[2, 3] < ground.tops[level, j, i]
 
 
 @njit(cache=True)
@@ -132,6 +173,7 @@ def _mark(
     balls: InnerBalls,
     planes: NDArray,
     starts: NDArray,
+    ground: Ground,
     first: NDArray,
     second: NDArray,
     third: NDArray,
@@ -144,24 +186,32 @@ def _mark(
     for i in mine:
         hinge[0] = frames[0]
         link[0] = turned(hinge[0], axes[0], float(first[i]))
-        if _any_meets(hinge, link, axes, balls, 0, planes, starts, half):
+        if _any_meets(hinge, link, axes, balls, 0, planes, starts, ground, half):
             blocked[i] = True
             continue
         for j in range(len(second)):
             hinge[1] = product(link[0], frames[1])
             link[1] = turned(hinge[1], axes[1], float(second[j]))
-            if _any_meets(hinge, link, axes, balls, 1, planes, starts, half):
+            if _any_meets(hinge, link, axes, balls, 1, planes, starts, ground, half):
                 blocked[i, j] = True
                 continue
             hinge[2] = product(link[1], frames[2])
             for m in range(len(third)):
                 link[2] = turned(hinge[2], axes[2], float(third[m]))
-                blocked[i, j, m] = _any_meets(hinge, link, axes, balls, 2, planes, starts, half)
+                blocked[i, j, m] = _any_meets(hinge, link, axes, balls, 2, planes, starts, ground, half)
 
 
 @njit(cache=True)
 def _any_meets(
-    hinge: NDArray, link: NDArray, axes: NDArray, balls: InnerBalls, stage: int, planes: NDArray, starts: NDArray, half: float
+    hinge: NDArray,
+    link: NDArray,
+    axes: NDArray,
+    balls: InnerBalls,
+    stage: int,
+    planes: NDArray,
+    starts: NDArray,
+    ground: Ground,
+    half: float,
 ) -> bool:
     """Whether a ball that arm joint `stage` carries meets a body although each joint turns by up to `half` [rad]."""
     for s in range(len(balls.radii)):
@@ -174,7 +224,8 @@ def _any_meets(
             u, v, w = x - hinge[joint, 0, 3], y - hinge[joint, 1, 3], z - hinge[joint, 2, 3]
             along = u * a + v * b + w * c
             moved += half * (np.sqrt(max(u * u + v * v + w * w - along * along, 0.0)) + moved)
-        if _meets(planes, starts, x, y, z, balls.radii[s] - moved):
+        reach = balls.radii[s] - moved
+        if _meets(planes, starts, x, y, z, reach) or _meets_ground(ground, x, y, z, reach):
             return True
     return False
 

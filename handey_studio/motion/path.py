@@ -23,7 +23,7 @@ from handey_studio.world.collision import Pairs
 from handey_studio.world.collision_bodies import DEPTH_MAP, OUTSIDE, TABLE
 
 STAGE = "path"
-FEW_GROWTHS = 2000  # of the random trees, before it is asked whether there can be a path at all
+FEW_GROWTHS = 500  # of the random trees, before it is asked whether there can be a path at all, and for finer cells
 
 
 class Attempt(NamedTuple):
@@ -92,34 +92,36 @@ def _none(asked: Query, reason: str, ledger: Ledger, space: CSpaceSummary | None
 
 
 def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Iterator[Attempt]:
-    """What is tried, one after the other, what is cheap first."""
+    """What is tried, one after the other, what is cheap first: some growths of the random trees, and the proof that there is no path, cost
+    less than finer cells.
+    """
     if asked.options.straight and asked.free.moves(asked.start, asked.goal):
         yield Attempt("straight", np.array([asked.start, asked.goal]), [asked.free], None, "")
     ways = wrist_ways(asked, rng, 2)
     if not ways:
         yield Attempt("wrist", _nothing(asked), [], None, "the wrist finds no way to turn that keeps the hand off the arm")
-    steps = asked.options.steps_deg
+    steps, growths = asked.options.steps_deg, asked.options.tree_growths
     for k, step in enumerate(steps):
         for needed, layers in _plans(asked, ways, step):
             progress.report(k / (len(steps) + 1), f"configuration space of the arm joints, {step:g}° cells")
             found = three_legs(asked, layers(), rng, progress)
             needed = ", ".join(word for word in (needed, found.more) if word)
             yield Attempt(needed, found.points, found.movers, found.space, found.reason, bodies=found.bodies)
-    if asked.options.tree_growths:
-        yield from _trees(asked, rng, progress)
+            if found.shut:
+                break
+        if k == 0 and growths:
+            yield _trees(asked, min(FEW_GROWTHS, growths), rng, progress)
+            if surely_apart(asked):
+                why = "start and goal stay apart even where only what is wholly blocked is taken out"
+                yield Attempt("proof", _nothing(asked), [], None, why, proven=True)
+    if growths > FEW_GROWTHS:
+        yield _trees(asked, growths, rng, progress)
 
 
-def _trees(asked: Query, rng: np.random.Generator, progress: Progress) -> Iterator[Attempt]:
-    """Random trees; after a few growths, whether there can be a path at all."""
-    few = min(FEW_GROWTHS, asked.options.tree_growths)
-    for most in dict.fromkeys((few, asked.options.tree_growths)):
-        points, movers, grown = grow_trees(asked, most, rng, progress)
-        why = "" if len(points) else f"random trees did not meet in {grown} growths"
-        yield Attempt(f"random trees, {grown} growths", points, movers, None, why)
-        if most == few and not len(points) and surely_apart(asked):
-            why = "start and goal stay apart even where only what is wholly blocked is taken out"
-            yield Attempt("proof", _nothing(asked), [], None, why, proven=True)
-            return
+def _trees(asked: Query, most: int, rng: np.random.Generator, progress: Progress) -> Attempt:
+    points, movers, grown = grow_trees(asked, most, rng, progress)
+    why = "" if len(points) else f"random trees did not meet in {grown} growths"
+    return Attempt(f"random trees, {grown} growths", points, movers, None, why)
 
 
 def _plans(asked: Query, ways: list[tuple[str, NDArray]], step: float) -> Iterator[tuple[str, Callable[[], Layers]]]:

@@ -23,7 +23,8 @@ NO_PLACE = 2  # cells around one in which the wrist does not turn at one place, 
 @dataclass(frozen=True, eq=False)
 class ThreeLegs:
     """What one stack of spaces gave: the path's points (n, joints) [rad] and the mover of each segment, empty when none; `reason` why, and
-    the `bodies` in the way. `more` tells at which ends more than one leg was needed.
+    the `bodies` in the way. `more` tells at which ends more than one leg was needed. `shut`: no cell is free with the wrist as it is at one
+    of the ends, however it turns between them.
     """
 
     points: NDArray
@@ -32,6 +33,7 @@ class ThreeLegs:
     space: CSpaceSummary
     bodies: tuple[str, ...] = ()
     more: str = ""
+    shut: bool = False
 
 
 def three_legs(query: Query, layers: Layers, rng: np.random.Generator | None = None, progress: Progress | None = None) -> ThreeLegs:
@@ -60,7 +62,8 @@ def three_legs(query: Query, layers: Layers, rng: np.random.Generator | None = N
         points = np.concatenate([first.points, between[1:], last.points[::-1][1:]])
         movers = [*first.movers, *[query.free] * (len(between) - 1), *last.movers[::-1]]
         return ThreeLegs(points, movers, "", summary(layers, cells), more=", ".join(more))
-    return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(layers, np.empty((0, 4))), bodies)
+    shut = len(layers.spaces) > 1 and any(layers.spaces[end.layer].blocked.all() for end in ends)
+    return ThreeLegs(np.empty((0, len(query.start))), [], reason, summary(layers, np.empty((0, 4))), bodies, shut=shut)
 
 
 def _unreached(end: End, layers: Layers, region: int) -> tuple[str, tuple[str, ...]]:
