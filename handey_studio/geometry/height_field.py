@@ -42,5 +42,5 @@ class HeightField(Value):
         ny, nx = (-(-n // factor) * factor for n in self.top.shape)
         padded = np.full((ny, nx), -np.inf)
         padded[: self.top.shape[0], : self.top.shape[1]] = self.top
-        blocks = padded.reshape(ny // factor, factor, nx // factor, factor)
-        return HeightField(blocks.max(axis=(1, 3)), self.cell * factor, self.T_world_range)
+        strips = padded.reshape(ny // factor, factor, nx).max(axis=1)
+        return HeightField(strips.reshape(ny // factor, nx // factor, factor).max(axis=2), self.cell * factor, self.T_world_range)

@@ -8,6 +8,7 @@ not hang on the wrist and is kept for the next question.
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 from handey_studio.base import Value, frozen_array
 from handey_studio.motion.certificate import Mover
 from handey_studio.motion.certificate import mover as mover_of
-from handey_studio.motion.distance_field import distance_field
-from handey_studio.motion.forbidden_ranges import first_ranges, second_ranges, third_ranges
+from handey_studio.motion.distance_field import Field, distance_field
+from handey_studio.motion.forbidden_ranges import Cells, first_ranges, second_ranges, third_ranges
 from handey_studio.motion.marching import DOUBT, FREE, SOLID
 from handey_studio.motion.self_collision import self_blocked
 from handey_studio.motion.turning import Between, angle_table, carried_circles, hinges_of, link_circles, reach_of
@@ -58,8 +59,11 @@ class Extent:
 
     def of_one_turn(self, cells: NDArray) -> NDArray:
         """These cells, given all from the joints' limits on up to one turn."""
-        for axis in (2, 1, 0):
-            cells = cells.take((self.first[axis] + np.arange(self.counts[axis])) % self.turn, axis=axis)
+        for axis, count in enumerate(self.counts):
+            first = self.first[axis] % self.turn
+            turns = range(0, first + count, self.turn)
+            pieces = [np.moveaxis(cells, axis, 0)[max(first - turn, 0) : first + count - turn][: self.turn] for turn in turns]
+            cells = np.moveaxis(pieces[0] if len(pieces) == 1 else np.concatenate(pieces), 0, axis)
         return cells
 
 
@@ -116,28 +120,36 @@ def configuration_space(mover: Mover, wrists: NDArray, extent: Extent) -> tuple[
     """
     world = mover.model.world
     carried = Carried(world.robot, mover.margin, mover.opening, mover.held, tuple(tuple(posture) for posture in wrists.tolist()))
-    blocked = np.repeat(_own_cells(carried, extent.step)[None], len(_values(world.robot, extent.step)[0]), axis=0)
+    met = np.repeat(_own_cells(carried, extent.step).astype(np.int8)[:, None], len(_values(world.robot, extent.step)[0]), axis=1)
     for obstacles in obstacles_apart(world):
-        blocked |= _scene_cells(obstacles, carried, extent.step) != FREE
-    return ConfigurationSpace(extent, world.robot.arm_index, extent.of_one_turn(blocked)), _box(carried)
+        met |= _scene_cells(obstacles, carried, extent.step).states
+    return ConfigurationSpace(extent, world.robot.arm_index, extent.of_one_turn((met != FREE).swapaxes(0, 1))), _box(carried)
 
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What is looked at by itself: a world. Where it stands `among` others whose cells are known, nothing is asked that these settle."""
+    """What is looked at by itself: a world. Where it stands `among` others whose cells are known, nothing is asked that these settle, and
+    of the world only what is in it counts: the table and the outside belong to the others.
+    """
 
     world: World
     among: "Obstacles | None" = None
 
+    def field(self, reach: float) -> Field:
+        """The distances to them, as far as the arm may reach [m]."""
+        field = distance_field(self.world, reach)
+        return field._replace(table_z=NO_TABLE, free=np.array(EVERYWHERE)) if self.among else field
+
 
 def obstacles_apart(world: World) -> list[Obstacles]:
-    """The world in pieces that are free where all of them are: all that stays where it is, and each part by itself.
+    """The world in pieces that are free where all of them are: the table and the outside, all else that stays, and each part by itself.
 
-    When a part moves, the cells of all the others are kept.
+    When a part moves, the cells of all the others are kept, and at a new depth map those of the table.
     """
-    stays = Obstacles(replace(world, parts=()))
-    alone = [World(world.robot, NO_TABLE, parts=(placed,), free_space=EVERYWHERE) for placed in world.parts]
-    return [stays, *(Obstacles(one, stays) for one in alone)]
+    robot = world.robot
+    bare = Obstacles(World(robot, world.table_z, free_space=world.free_space))
+    stays = Obstacles(replace(world, parts=()), bare)
+    return [stays, *(Obstacles(World(robot, NO_TABLE, parts=(placed,), free_space=EVERYWHERE), stays) for placed in world.parts)]
 
 
 @dataclass(frozen=True)
@@ -157,37 +169,57 @@ def _box(carried: Carried) -> WristBox:
 
 
 @lru_cache(maxsize=64)
-def _scene_cells(obstacles: Obstacles, carried: Carried, step: float) -> NDArray:
-    """What the cells (n1, n2, n3), all within the limits up to one turn, are with regard to obstacles; kept in this process.
+def _scene_cells(obstacles: Obstacles, carried: Carried, step: float) -> Cells:
+    """What the cells, all within the limits up to one turn, are with regard to obstacles and what they are among; kept in this process.
 
     Only those are looked at which the cells of twice their width, up to `COARSEST`, leave in doubt.
     """
     robot, box, values = carried.robot, _box(carried), _values(carried.robot, step)
     held, reach = Between.of(robot, box.wrists), reach_of(robot, box)
-    rows, links = _link_cells(obstacles, carried.margin, step, held, reach)
-    known = np.maximum(links, _scene_cells(obstacles.among, carried, step)) if obstacles.among else links
-    coarse = None if _coarsest(step) else _scene_cells(obstacles, carried, 2 * step)
-    field, circles = distance_field(obstacles.world, reach), carried_circles(robot, box, carried.margin, held, step)
-    places = (values[0], values[1])
-    return third_ranges(field, hinges_of(robot, held), circles, places, angle_table(values[2]), step, rows, coarse, known, links)
+    links = _link_cells(obstacles, carried.margin, step, held, reach)
+    known = links.cells.states
+    if obstacles.among:
+        known = np.maximum(known, _scene_cells(obstacles.among, carried, step).states)
+    wider = None if _coarsest(step) else _scene_cells(obstacles, carried, 2 * step)
+    field, circles = obstacles.field(reach), carried_circles(robot, box, carried.margin, held, step)
+    return third_ranges(field, hinges_of(robot, held), circles, values[:2], angle_table(values[2]), step, links.own, wider, known)
+
+
+class Links(NamedTuple):
+    """What links up to the carrier meet: `own` (n1, n2), rows as obstacles leave them, FREE where those that they are among settle it; the
+    same `rows` as all of them leave them; and `cells`. Up to one turn each.
+    """
+
+    own: NDArray
+    rows: NDArray
+    cells: Cells
 
 
 @lru_cache(maxsize=32)
-def _link_cells(obstacles: Obstacles, margin: float, step: float, held: Between, reach: float) -> tuple[NDArray, NDArray]:
-    """What links up to the carrier meet: rows (n1, n2) as those before it leave them, and cells (n1, n2, n3), up to one turn each."""
+def _link_cells(obstacles: Obstacles, margin: float, step: float, held: Between, reach: float) -> Links:
     robot, coarsest = obstacles.world.robot, _coarsest(step)
     values = _values(robot, step)
-    hinges, turns, field = hinges_of(robot, held), [angle_table(angles) for angles in values], distance_field(obstacles.world, reach)
+    hinges, turns, field = hinges_of(robot, held), [angle_table(angles) for angles in values], obstacles.field(reach)
     circles = [link_circles(robot, stage, margin, held, step) for stage in range(3)]
-    known_rows, known = _link_cells(obstacles.among, margin, step, held, reach) if obstacles.among else (None, None)
-    first, rows = np.full(len(values[0]), DOUBT, np.int8), np.full((len(values[0]), len(values[1])), DOUBT, np.int8)
-    if known_rows is not None:
-        rows[known_rows == SOLID if coarsest else known_rows != FREE] = FREE  # which asks nothing
+    among = _link_cells(obstacles.among, margin, step, held, reach) if obstacles.among else None
+    wider = None if coarsest else _link_cells(obstacles, margin, 2 * step, held, reach)
+    first, own = np.full(len(values[0]), DOUBT, np.int8), np.full((len(values[0]), len(values[1])), DOUBT, np.int8)
+    if wider:
+        own = _halved(wider.own, *own.shape, beyond=DOUBT)
+    if among:
+        own[among.rows == SOLID if coarsest else among.rows != FREE] = FREE  # which asks nothing
     first_ranges(field, hinges, circles[0], turns[0], step, coarsest, first)
-    second_ranges(field, hinges, circles[1], values[0], turns[1], step, coarsest, first, rows)
-    coarse = None if coarsest else _link_cells(obstacles, margin, 2 * step, held, reach)[1]
-    places = (values[0], values[1])
-    return rows, third_ranges(field, hinges, circles[2], places, turns[2], step, rows, coarse, known, None)
+    second_ranges(field, hinges, circles[1], values[0], turns[1], step, coarsest, first, own)
+    rows, known = (np.maximum(own, among.rows), among.cells.states) if among else (own, None)
+    return Links(own, rows, third_ranges(field, hinges, circles[2], values[:2], turns[2], step, own, wider and wider.cells, known))
+
+
+def _halved(wider: NDArray, first: int, second: int, beyond: int) -> NDArray:
+    """Cells (first, second) of half the width, as the wider ones have them; those `beyond` these are that."""
+    cells = np.full((first, second), beyond, wider.dtype)
+    inside = wider.repeat(2, axis=0).repeat(2, axis=1)[:first, :second]
+    cells[: inside.shape[0], : inside.shape[1]] = inside
+    return cells
 
 
 @lru_cache(maxsize=32)
@@ -195,8 +227,7 @@ def _own_cells(carried: Carried, step: float) -> NDArray:
     """Cells (n2, n3) in which the arm meets itself, seen at the centres of the coarsest cells."""
     values = _values(carried.robot, step)
     if not _coarsest(step):
-        wide = _own_cells(carried, 2 * step).repeat(2, axis=0).repeat(2, axis=1)[: len(values[1]), : len(values[2])]
-        return np.pad(wide, [(0, len(values[1]) - wide.shape[0]), (0, len(values[2]) - wide.shape[1])], constant_values=True)
+        return _halved(_own_cells(carried, 2 * step), len(values[1]), len(values[2]), beyond=True)
     way = np.array(carried.way)
     middle = way[len(way) // 2] if len(way) > 2 else way.mean(axis=0)
     mine = mover_of(World(carried.robot), carried.opening, carried.held, (), carried.margin)
@@ -208,7 +239,8 @@ def _coarsest(step: float) -> bool:
     return 2 * step > COARSEST
 
 
-def _values(robot: Robot, step: float) -> tuple[NDArray, ...]:
+def _values(robot: Robot, step: float) -> tuple[NDArray, NDArray, NDArray]:
     """Centres [rad] of all cells within the limits, up to one turn."""
     extent = extent_around(robot, step)
-    return tuple(centres[: extent.turn] for centres in extent.centres)
+    first, second, third = (centres[: extent.turn] for centres in extent.centres)
+    return first, second, third

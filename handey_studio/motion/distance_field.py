@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
 from handey_studio.geometry import HeightField
+from handey_studio.motion.cores import share
 from handey_studio.world import World
 from handey_studio.world.collision import CollisionModel, collision_model
 from handey_studio.world.collision_bodies import Obstacles, terrain_obstacles
@@ -74,7 +75,8 @@ def _grid(model: CollisionModel, bottom: float, free: NDArray, margin: float) ->
     """The grid over all bodies but the table and the outside, as far as they are in the space `free` (2, 3) [m], and `margin` around them;
     nothing below `bottom` [m].
     """
-    boxes = np.concatenate([_spans(model.solids)[model.slabs :], _column_spans(model.terrain)])
+    tree = model.terrain.tree
+    boxes = np.concatenate([_spans(model.solids)[model.slabs :], np.stack([tree.low[:1], tree.high[:1]], axis=1)])
     boxes = np.stack([np.maximum(boxes[:, 0], [*free[0, :2], bottom]), np.minimum(boxes[:, 1], free[1])], axis=1)
     boxes = boxes[(boxes[:, 1] > boxes[:, 0]).all(axis=1)]
     if not len(boxes):
@@ -96,7 +98,7 @@ def _spans(fixed: Obstacles) -> NDArray:
 
 def _column_spans(terrain: Obstacles) -> NDArray:
     """Lower and upper corners (k, 2, 3) [m] of the depth map's columns, as their tree has them."""
-    leaves = (terrain.tree.left < 0) & (terrain.tree.right >= 0)
+    leaves = slice(len(terrain.tree.low) // 2, len(terrain.tree.low) // 2 + len(terrain.name))
     return np.stack([terrain.tree.low[leaves], terrain.tree.high[leaves]], axis=1)
 
 
@@ -176,32 +178,54 @@ def _fill_columns(tops: NDArray, nz: int, spans: NDArray, low: NDArray, cell: fl
 
 
 def column_distances(tops: NDArray, nz: int, cell: float, clip: float) -> NDArray:
-    """Distance [m] (nx, ny, nz) float32, up to `clip`, between each voxel and the nearest of columns `tops` (nx, ny) voxels high."""
-    above = np.maximum(np.arange(nz)[None, None] - tops[:, :, None], 0) * cell
-    squares = np.where(tops[:, :, None] > 0, np.minimum(above, clip) ** 2, clip * clip).astype(np.float32)
-    gaps = (np.arange(int(np.ceil(clip / cell)) + 1) * cell) ** 2
-    out = np.empty_like(squares)
-    _spread(squares, gaps.astype(np.float32), out)
-    swapped = np.ascontiguousarray(out.swapaxes(0, 1))
-    across = np.empty_like(swapped)
-    _spread(swapped, gaps.astype(np.float32), across)
-    return np.ascontiguousarray(np.sqrt(across.swapaxes(0, 1)))
+    """Distance [m] (nx, ny, nz) float32, up to `clip`, between each voxel and the nearest of columns `tops` (nx, ny) voxels high.
+
+    One axis after the other; the cores share the slices.
+    """
+    shape, gaps = (*tops.shape, nz), ((np.arange(int(np.ceil(clip / cell)) + 1) * cell) ** 2).astype(np.float32)
+    along, out = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    share(lambda mine: _spread_columns(tops, gaps, cell, clip, mine, along), tops.shape[0])
+    share(lambda mine: _spread(along, np.flatnonzero(tops.any(axis=1)), gaps, mine, out), tops.shape[0])
+    return out
 
 
-@njit(cache=True, fastmath=True)
-def _spread(squares: NDArray, gaps: NDArray, out: NDArray) -> None:
-    """The least of each neighbour's square along the first axis plus that of the gap between the two voxels."""
-    n, rows, nz = squares.shape
-    for i in range(n):
+@njit(cache=True, nogil=True, fastmath=True)
+def _spread_columns(tops: NDArray, gaps: NDArray, cell: float, clip: float, mine: NDArray, out: NDArray) -> None:
+    """Squares of the distances to the columns in the same slice (ny, nz), for the slices `mine` of the first axis."""
+    _, ny, nz = out.shape
+    above = np.empty((ny, nz), np.float32)
+    for i in mine:
+        best = out[i]
+        for j in range(ny):
+            for k in range(nz):
+                gap = np.float32(min(max(k - tops[i, j], 0) * cell, clip))
+                above[j, k] = gap * gap if tops[i, j] > 0 else np.float32(clip * clip)
+                best[j, k] = above[j, k]
+        for j in range(ny):
+            if tops[i, j] > 0:
+                for other in range(max(j - len(gaps), 0), min(j + len(gaps) + 1, ny)):
+                    if other != j:
+                        _lower(best[other], above[j], gaps[abs(other - j) - 1])
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _spread(squares: NDArray, filled: NDArray, gaps: NDArray, mine: NDArray, out: NDArray) -> None:
+    """Distances for the slices `mine`: the root of the least of the `filled` slices' squares plus that of the gap to them."""
+    for i in mine:
         best = out[i]
         best[:] = squares[i]
-        for step in range(-len(gaps), len(gaps) + 1):
-            if step == 0 or i + step < 0 or i + step >= n:
-                continue
-            gap, other = gaps[abs(step) - 1], squares[i + step]
-            for j in range(rows):
-                for k in range(nz):
-                    best[j, k] = min(best[j, k], other[j, k] + gap)
+        for other in filled:
+            if other != i and abs(other - i) <= len(gaps):
+                for j in range(best.shape[0]):
+                    _lower(best[j], squares[other, j], gaps[abs(other - i) - 1])
+        best[:] = np.sqrt(best)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _lower(best: NDArray, squares: NDArray, gap: float) -> None:
+    """Lowers a row to another's squares plus that of the gap."""
+    for k in range(len(best)):
+        best[k] = min(best[k], squares[k] + gap)
 
 
 @njit(cache=True)

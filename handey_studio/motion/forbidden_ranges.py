@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from handey_studio.motion.cores import share
 from handey_studio.motion.distance_field import Field
-from handey_studio.motion.marching import DOUBT, FREE, LACKING, SOLID, Circles, march, needs, place, room
+from handey_studio.motion.marching import DOUBT, FREE, LACKING, SOLID, Circles, march, needs, place, refine, room
+
+EVERY_BALL = 2**32 - 1
 
 
 class Hinges(NamedTuple):
@@ -23,6 +25,17 @@ class Hinges(NamedTuple):
     T_first_second: NDArray
     T_second_third: NDArray
     axes: NDArray
+
+
+class Cells(NamedTuple):
+    """What the cells of joints 2, 1 and 3, in this order, are: `states` (n2, n1, n3). And which balls lack clearance in those of the
+    widest cells that are in doubt: `lacking` (w2, w1, w3 + 1) uint32, a bit for each, all of them where nothing is known. The widest ones
+    have been `halved` so often.
+    """
+
+    states: NDArray
+    lacking: NDArray
+    halved: int
 
 
 @njit(cache=True)
@@ -79,7 +92,7 @@ def _axis(T: NDArray, axis: NDArray) -> NDArray:
 def second_ranges(
     field: Field, hinges: Hinges, these: Circles, values: NDArray, turns: NDArray, step: float, tell: bool, first: NDArray, cells: NDArray
 ) -> None:
-    """Settles the cells (n1, n2) of the second joint, for each value of the first, in which its link may meet the scene.
+    """Settles the cells (n1, n2) of the second joint, for each value of the first, in which its link may meet the scene; those in doubt.
 
     Those of a value that is not free in `first` (n1,) are all as that is.
     """
@@ -104,22 +117,21 @@ def third_ranges(
     turns: NDArray,
     step: float,
     rows: NDArray,
-    coarse: NDArray | None,
+    wider: Cells | None,
     known: NDArray | None,
-    least: NDArray | None,
-) -> NDArray:
-    """The cells (n1, n2, n3) of the third joint, for each value of the first two, as what it carries leaves them.
+) -> Cells:
+    """The cells of the third joint, for each value of the first two, as what it carries leaves them.
 
-    All of a row are at least as it is in `rows` (n1, n2), each as it is in `least`. Only those are looked at which are in doubt in
-    `coarse`, the cells of twice their width, and of which nothing is `known` that settles them; the others stay as they are there. Without
-    `coarse` all are in doubt, and solid ones are told. Each value of the second joint is a task of its own; the cores share them.
+    All of a row are at least as it is in `rows` (n1, n2), each as it is `known` to be (n2, n1, n3). Only those are looked at which are in
+    doubt in `wider`, the cells of twice their width, and which what is known does not settle; the others stay as they are there. Without
+    `wider` all are in doubt, and solid ones are told. Each value of the second joint is a task of its own; the cores share them.
     """
-    shape = (*rows.shape, len(turns))
-    nothing, tell, cells = np.zeros(shape, np.int8), coarse is None, np.empty(shape, np.int8)
-    wide = np.empty((0, 0, 0), np.int8) if coarse is None else coarse
-    states = (wide, nothing if known is None else known, nothing if least is None else least)
-    share(lambda mine: _third_ranges(field, hinges, these, values, turns, step, tell, rows, states, cells, mine), len(values[1]))
-    return cells
+    shape = (len(values[1]), len(values[0]), len(turns))
+    known, states = np.empty((0, 0, 0), np.int8) if known is None else known, np.empty(shape, np.int8)
+    if wider is None:
+        wider = Cells(np.empty((0, 0, 0), np.int8), np.full((*shape[:2], shape[2] + 1), EVERY_BALL, np.uint32), -1)
+    share(lambda mine: _third_ranges(field, hinges, these, values, turns, step, rows, wider, known, states, mine), len(values[1]))
+    return Cells(states, wider.lacking, wider.halved + 1)
 
 
 @njit(cache=True, nogil=True)
@@ -130,48 +142,65 @@ def _third_ranges(
     values: tuple[NDArray, NDArray],
     turns: NDArray,
     step: float,
-    tell: bool,
     rows: NDArray,
-    states: tuple[NDArray, NDArray, NDArray],
-    cells: NDArray,
+    wider: Cells,
+    known: NDArray,
+    states: NDArray,
     mine: NDArray,
 ) -> None:
     """The same for some values of the second joint, those with numbers `mine`."""
     n1, n3, k = len(values[0]), len(turns), len(these.radius)
-    coarse, known, least = states
+    halved, tell = wider.halved + 1, wider.halved < 0
     groups = len(these.first) - 1
     local, worlds, before, work = np.empty((k, 9)), np.empty((n1, 4, 4)), np.empty((2, 6)), room(k, groups, n3)
     for i in range(n1):
         worlds[i] = turned(hinges.T_world_first, hinges.axes[0], values[0][i])
     before[0] = _axis(hinges.T_first_second, hinges.axes[1])
     before[1] = _axis(np.eye(4), hinges.axes[0])
+    free = np.full(n3, FREE, np.int8)
     for j in mine:
-        ready = False
+        ready, blank = False, True
         for i in range(n1):
-            row = cells[i, j]
-            if rows[i, j] == FREE and _ask(coarse, known, i, j, tell, row):
+            row, a, b = states[j, i], i >> halved, j >> halved
+            least = known[j, i] if len(known) else free
+            if rows[i, j] == FREE and _ask(wider.states, least, i, j, tell, row):
                 if not ready:
                     T = product(turned(hinges.T_first_second, hinges.axes[1], float(values[1][j])), hinges.T_second_third)
                     place(T, these, local)
-                    needs(local, these, k - groups - 1, k, turns, before, step / 2, work.need)
-                    work.known[:], ready = False, True
-                march(field, worlds[i], local, these, turns, before, step, tell, work, row)
-            for m in range(n3):
-                here = rows[i, j] if rows[i, j] != FREE else DOUBT if row[m] == LACKING else row[m]
-                row[m] = max(here, least[i, j, m])
+                    ready = True
+                if not tell and b < wider.lacking.shape[0] and a < wider.lacking.shape[1] and wider.lacking[b, a, 0] != EVERY_BALL:
+                    refine(field, worlds[i], local, these, turns, before, step, wider.lacking[b, a], halved, row)
+                else:
+                    if blank:
+                        needs(local, these, k - groups - 1, k, turns, before, step / 2, work.need)
+                        work.known[:], blank = False, False
+                    march(field, worlds[i], local, these, turns, before, step, tell, work, row)
+                    if tell:
+                        wider.lacking[j, i, :n3] = work.lacking
+            _close(row, rows[i, j], least)
 
 
 @njit(cache=True)
-def _ask(coarse: NDArray, known: NDArray, i: int, j: int, tell: bool, row: NDArray) -> bool:
+def _ask(wider: NDArray, known: NDArray, i: int, j: int, tell: bool, row: NDArray) -> bool:
     """Writes a row (n,) as the cells of twice its width have it, LACKING where what is in doubt need not be looked at; whether any need."""
     n, a, b = len(row), i // 2, j // 2
-    inside = min(2 * coarse.shape[2], n) if a < coarse.shape[0] and b < coarse.shape[1] else 0
-    asked = False
+    row[:] = DOUBT
+    if b < wider.shape[0] and a < wider.shape[1]:
+        twice = wider[b, a]
+        for m in range(min(len(twice), n // 2)):
+            row[2 * m] = twice[m]
+            row[2 * m + 1] = twice[m]
+    enough, asked = SOLID if tell else DOUBT, 0
     for m in range(n):
-        row[m] = coarse[a, b, m // 2] if m < inside else DOUBT
-        if row[m] == DOUBT:
-            if known[i, j, m] == SOLID or (known[i, j, m] == DOUBT and not tell):
-                row[m] = LACKING
-            else:
-                asked = True
-    return asked
+        asks = row[m] == DOUBT and known[m] < enough
+        row[m] = LACKING if row[m] == DOUBT and not asks else row[m]
+        asked += asks
+    return asked > 0
+
+
+@njit(cache=True)
+def _close(row: NDArray, before: int, least: NDArray) -> None:
+    """What was looked at no further stays in doubt; no cell is freer than its row `before`, nor than `least` (n,) has it."""
+    for m in range(len(row)):
+        here = before if before != FREE else DOUBT if row[m] == LACKING else row[m]
+        row[m] = max(here, least[m])

@@ -15,6 +15,7 @@ from handey_studio.motion.distance_field import Field, clearance_at
 
 FREE, DOUBT, SOLID = 0, 1, 2
 LACKING = 3  # while a row is looked at: what was in doubt and is not free; what stays in doubt becomes free
+BITS = 32  # of balls that lack clearance; those whose numbers differ by as many share theirs
 
 
 class Circles(NamedTuple):
@@ -46,48 +47,55 @@ def place(T: NDArray, these: Circles, out: NDArray) -> None:
 
 
 @njit(cache=True)
-def need_of(circle: NDArray, start: float, turns: NDArray, before: NDArray, half: float, out: NDArray) -> None:
-    """The clearance (n,) [m] that a ball needs at each of n angles with `turns` (n, 2) cosine and sine; `start` without what moves it.
+def need_at(circle: NDArray, start: float, c: float, d: float, before: NDArray, half: float) -> float:
+    """The clearance [m] that a ball needs at the angle with cosine c and sine d; `start` without what moves it.
 
     `before` (b, 6) are the point and direction of the axes of the arm joints before, the nearest first, in the circles' frame. The joints
     move one by one, from the last to the first: a point at distance r of an axis, displaced by D already, is moved by `half`·(r + D) more.
     """
-    for m in range(len(turns)):
-        c, d = turns[m]
-        x = circle[0] + c * circle[3] + d * circle[6]
-        y = circle[1] + c * circle[4] + d * circle[7]
-        z = circle[2] + c * circle[5] + d * circle[8]
-        moved = start
-        for b in range(len(before)):
-            u, v, w = x - before[b, 0], y - before[b, 1], z - before[b, 2]
-            along = u * before[b, 3] + v * before[b, 4] + w * before[b, 5]
-            moved += half * (np.sqrt(max(u * u + v * v + w * w - along * along, 0.0)) + moved)
-        out[m] = moved
+    x = circle[0] + c * circle[3] + d * circle[6]
+    y = circle[1] + c * circle[4] + d * circle[7]
+    z = circle[2] + c * circle[5] + d * circle[8]
+    moved = start
+    for b in range(len(before)):
+        u, v, w = x - before[b, 0], y - before[b, 1], z - before[b, 2]
+        along = u * before[b, 3] + v * before[b, 4] + w * before[b, 5]
+        moved += half * (np.sqrt(max(u * u + v * v + w * w - along * along, 0.0)) + moved)
+    return moved
 
 
 @njit(cache=True)
 def needs(local: NDArray, these: Circles, first: int, last: int, turns: NDArray, before: NDArray, half: float, out: NDArray) -> None:
     """Fills in the needs (k, n) [m] of the balls `first` to `last` - 1."""
     for s in range(first, last):
-        need_of(local[s], half * these.distance[s] + these.slack[s], turns, before, half, out[s])
-        out[s] += these.radius[s]
+        start = half * these.distance[s] + these.slack[s]
+        for m in range(len(turns)):
+            out[s, m] = need_at(local[s], start, turns[m, 0], turns[m, 1], before, half) + these.radius[s]
 
 
 class Work(NamedTuple):
     """Room for what is found out on the way: the `need` (k, n) [m] of each ball at each angle; which groups' small balls are in it, `known`
-    (groups,); and two sets of cells of a row (n,).
+    (groups,); two sets of cells of a row (n,); and which small balls lack clearance in each, `lacking` (n,) uint32, a bit for each.
     """
 
     need: NDArray
     known: NDArray
     around: NDArray
     near: NDArray
+    lacking: NDArray
 
 
 @njit(cache=True)
 def room(balls: int, groups: int, angles: int) -> Work:
     """Room for the work on rows of so many angles."""
-    return Work(np.empty((balls, angles)), np.zeros(groups, np.bool_), np.empty(angles, np.bool_), np.empty(angles, np.bool_))
+    sets = np.empty(angles, np.bool_), np.empty(angles, np.bool_)
+    return Work(np.empty((balls, angles)), np.zeros(groups, np.bool_), sets[0], sets[1], np.zeros(angles, np.uint32))
+
+
+@njit(cache=True)
+def bit_of(ball: int) -> np.uint32:
+    """The bit of a small ball."""
+    return np.uint32(np.uint32(1) << np.uint32(ball % BITS))
 
 
 @njit(cache=True)
@@ -103,7 +111,8 @@ def march(
     work: Work,
     row: NDArray,
 ) -> None:
-    """Settles those cells of a row (n,) that are in doubt. With `tell` solid ones are told from those that stay in doubt.
+    """Settles those cells of a row (n,) that are in doubt. With `tell` solid ones are told from those that stay in doubt, and which balls
+    lack clearance in these.
 
     Its circles are `local` (k, 9) in a frame that T (4, 4) maps to the world. The ball around all goes first, then that of each group; the
     small ones look only where it lacks clearance, and their needs are filled in when first asked for.
@@ -114,6 +123,7 @@ def march(
     groups = len(these.first) - 1
     small, top = len(local) - groups - 1, len(local) - 1
     work.around[begin:end] = row[begin:end] == DOUBT
+    work.lacking[:] = 0
     if _lacks(field, T, local, these.distance, top, turns, work.need, step, work.around, work.near, begin, end):
         work.around[begin:end] = work.near[begin:end]
         for group in range(groups):
@@ -124,7 +134,55 @@ def march(
                 needs(local, these, first, last, turns, before, step / 2, work.need)
                 work.known[group] = True
             for s in range(first, last):
-                _mark(field, T, local, these, s, turns, work.need, step, tell, work.near, row, begin, end)
+                _mark(field, T, local, these, s, turns, step, tell, work, row, begin, end)
+    _settle(row, begin, end)
+
+
+@njit(cache=True)
+def refine(
+    field: Field,
+    T: NDArray,
+    local: NDArray,
+    these: Circles,
+    turns: NDArray,
+    before: NDArray,
+    step: float,
+    lacking: NDArray,
+    halved: int,
+    row: NDArray,
+) -> None:
+    """Settles those cells of a row (n,) that are in doubt, looking only at the small balls that are `lacking` clearance in the widest cells
+    (n / 2^halved,) around them: what a ball has there it has in all of it.
+    """
+    begin, end = _doubtful(row)
+    together = np.uint32(0)
+    for m in range(begin, end):
+        if row[m] == DOUBT:
+            together |= lacking[m >> halved]
+    for s in range(these.first[-1]):
+        if not together & bit_of(s):
+            continue
+        x, y, z = _image(T, local, s, 0, 1.0)
+        a, b, c = _image(T, local, s, 3, 0.0)
+        u, v, w = _image(T, local, s, 6, 0.0)
+        start, stretch = step / 2 * these.distance[s] + these.slack[s], _stretch(these.distance[s], step)
+        m = begin
+        while m < end:
+            if row[m] != DOUBT or not lacking[m >> halved] & bit_of(s):
+                m += 1
+                continue
+            p, q = turns[m, 0], turns[m, 1]
+            over = clearance_at(field, x + p * a + q * u, y + p * b + q * v, z + p * c + q * w) - these.radius[s]
+            over -= need_at(local[s], start, p, q, before, step / 2)
+            if over < 0.0:
+                row[m] = LACKING
+            m += 1 + int(min(max(over, 0.0) * stretch, float(end)))
+    _settle(row, begin, end)
+
+
+@njit(cache=True)
+def _settle(row: NDArray, begin: int, end: int) -> None:
+    """What stayed in doubt is free, what lacks clearance in doubt."""
     for m in range(begin, end):
         row[m] = FREE if row[m] == DOUBT else DOUBT if row[m] == LACKING else row[m]
 
@@ -202,31 +260,31 @@ def _mark(
     these: Circles,
     s: int,
     turns: NDArray,
-    need: NDArray,
     step: float,
     tell: bool,
-    near: NDArray,
+    work: Work,
     row: NDArray,
     begin: int,
     end: int,
 ) -> None:
-    """Marks the cells of a row from `begin` to `end`, those that are `near`, in which one ball lacks clearance or collides."""
+    """Marks the cells of a row from `begin` to `end`, those that are near, in which one ball lacks clearance or collides."""
     x, y, z = _image(T, local, s, 0, 1.0)
     a, b, c = _image(T, local, s, 3, 0.0)
     u, v, w = _image(T, local, s, 6, 0.0)
-    m, stretch, radius = begin, _stretch(these.distance[s], step), these.radius[s]
+    m, stretch, radius, bit = begin, _stretch(these.distance[s], step), these.radius[s], bit_of(s)
     while m < end:
-        if not near[m] or row[m] == SOLID or (row[m] == LACKING and not tell):
+        if not work.near[m] or row[m] == SOLID or (row[m] == LACKING and not tell):
             m += 1
             continue
         p, q = turns[m, 0], turns[m, 1]
         clearance = clearance_at(field, x + p * a + q * u, y + p * b + q * v, z + p * c + q * w)
-        over = clearance - need[s, m]
+        over = clearance - work.need[s, m]
         if over >= 0.0:
             m += 1 + int(min(over * stretch, float(end)))
             continue
         last = min(end, m + 1 + int(min(max(-over - field.cell, 0.0) * stretch, float(end))))
         for k in range(m, last):
+            work.lacking[k] |= bit
             if row[k] == DOUBT:
                 row[k] = LACKING
         if not tell:

@@ -1,6 +1,7 @@
 """Where the arm joints' hinges are, and which circles the balls of the arm run around them, with held joints within a range."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ def angle_table(angles: NDArray) -> NDArray:
     return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
+@lru_cache(maxsize=32)
 def hinges_of(robot: Robot, held: Between) -> Hinges:
     """The hinges of the arm joints with the held joints amid their ranges."""
     arm, joints = arm_of(robot), robot.arm_index
@@ -50,6 +52,7 @@ def hinges_of(robot: Robot, held: Between) -> Hinges:
     return Hinges(np.array(before[0]), np.array(second), np.array(third), np.array(arm.axes[joints]))
 
 
+@lru_cache(maxsize=64)
 def link_circles(robot: Robot, stage: int, margin: float, held: Between, step: float) -> Circles:
     """The circles of the links that the arm joint number `stage`, 0 to 2, turns and the next one does not."""
     centres, radii, links = link_balls(robot)
@@ -60,6 +63,7 @@ def link_circles(robot: Robot, stage: int, margin: float, held: Between, step: f
     return _circles(robot, stage, placed, radii[mine] + margin, _slack(robot, centres[mine], links[mine], held, step))
 
 
+@lru_cache(maxsize=64)
 def carried_circles(robot: Robot, box: WristBox, margin: float, held: Between, step: float) -> Circles:
     """The circles of what the wrist box holds, around the last arm joint."""
     links = np.full(len(box.radii), box.carrier)

@@ -30,9 +30,9 @@ def build_tree(low: NDArray, high: NDArray) -> Tree:
     order = np.argsort(_morton((low + high) / 2.0), kind="stable")
     lows[0][:k], highs[0][:k] = low[order], high[order]
     while len(lows[0]) > 1:
-        below = highs[0].reshape(-1, 2, 3)
-        lows.insert(0, lows[0].reshape(-1, 2, 3).min(axis=1))
-        highs.insert(0, np.where(np.isinf(below[:, 1]), below[:, 0], below.max(axis=1)))
+        one, other = highs[0][::2], highs[0][1::2]
+        lows.insert(0, np.minimum(lows[0][::2], lows[0][1::2]))
+        highs.insert(0, np.where(np.isinf(other), one, np.maximum(one, other)))
     inner = np.arange(leaves - 1)
     left = np.concatenate([2 * inner + 1, np.full(leaves, -1)])
     right = np.concatenate([2 * inner + 2, order, np.full(leaves - k, -1)])

@@ -136,11 +136,14 @@ def columns_of(terrain: HeightField | None, table_z: float, ceiling: float) -> N
     field = terrain.coarsened(max(1, round(COLUMN_M / terrain.cell)))
     top = np.minimum(np.where(np.isnan(field.top), np.inf, field.top), ceiling - field.T_world_range[2, 3])
     j, i = np.nonzero(top + field.T_world_range[2, 3] > table_z + TABLE_SKIN_M)
-    lower = np.stack([i * field.cell, j * field.cell, np.full(len(i), table_z - SOLID_M - field.T_world_range[2, 3])], axis=1)
-    upper = np.stack([(i + 1) * field.cell, (j + 1) * field.cell, top[j, i]], axis=1)
-    pick = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
-    corners = np.where(pick[None], upper[:, None], lower[:, None])
-    return corners @ field.T_world_range[:3, :3].T + field.T_world_range[:3, 3]
+    bottom = table_z - SOLID_M - field.T_world_range[2, 3]
+    x, y, z = field.T_world_range[:3, :3].T
+    lowest = field.T_world_range[:3, 3] + bottom * z + field.cell * (i[:, None] * x + j[:, None] * y)
+    sides = np.array([(a * x + b * y) * field.cell for a in (0, 1) for b in (0, 1)])
+    corners = np.empty((len(i), 4, 2, 3))
+    corners[:, :, 0] = lowest[:, None] + sides
+    corners[:, :, 1] = corners[:, :, 0] + ((top[j, i] - bottom)[:, None] * z)[:, None]
+    return corners.reshape(-1, 8, 3)
 
 
 @lru_cache(maxsize=8)
@@ -148,7 +151,10 @@ def terrain_obstacles(terrain: HeightField | None, table_z: float, ceiling: floa
     """The depth map's columns, kept from world to world; the number of their name is 0."""
     columns = columns_of(terrain, table_z, ceiling)
     k = len(columns)
-    tree = build_tree(columns.min(axis=1), columns.max(axis=1)) if k else NOWHERE
+    low = high = columns
+    for half in (4, 2, 1):  # much quicker than the least of eight
+        low, high = np.minimum(low[:, :half], low[:, half:]), np.maximum(high[:, :half], high[:, half:])
+    tree = build_tree(low[:, 0], high[:, 0]) if k else NOWHERE
     return Obstacles(columns.reshape(-1, 3), np.arange(k + 1) * 8, np.zeros(k, np.int64), tree)
 
 
