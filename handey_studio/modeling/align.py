@@ -16,7 +16,8 @@ from handey_studio.modeling.patches import Patches
 from handey_studio.modeling.patches_finding import patches_of
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.suggest import SuggestOptions, members_of
-from handey_studio.modeling.suggest_planes import CERTAIN_M, Body, BodyPlane, body_planes
+from handey_studio.modeling.suggest_clues import CERTAIN_M, Body
+from handey_studio.modeling.suggest_planes import BodyPlane, body_planes
 from handey_studio.modeling.suggestion import Alignment
 
 ITERATIONS = 6

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 
+SUPPORT = -2  # the support's number among a scan's patches
+
 
 @dataclass(frozen=True)
 class Border:

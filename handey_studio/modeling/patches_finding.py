@@ -7,16 +7,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt, find_objects
 
 from handey_studio.geometry.transforms import apply
-from handey_studio.modeling.patches import Border, Crease, Patch, Patches
+from handey_studio.modeling.patches import SUPPORT, Border, Crease, Patch, Patches
 from handey_studio.modeling.patches_bodies import bodies_of, creases_of
 from handey_studio.modeling.patches_growing import grown, normals_of, planes_of
 from handey_studio.modeling.patches_outlines import area_of, contours_of, outlines_of, rims_of
-from handey_studio.modeling.patches_sides import SUPPORT, Seen, drift_of, lost_at_rims
-from handey_studio.modeling.patches_windows import Field, field_of
+from handey_studio.modeling.patches_sides import Seen, drift_of, lost_at_rims
+from handey_studio.modeling.patches_windows import Field, field_of, noise_image
 from handey_studio.modeling.scans import Scan
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.sensing.drawing import Camera, camera_of
-from handey_studio.sensing.facets import sigma_at
 
 ON_SUPPORT_SIGMAS = 4.5
 INNER_PX = 3
@@ -35,7 +34,7 @@ class PatchOptions:
 def patches_of(scan: Scan, options: PatchOptions = PatchOptions()) -> Patches:
     """The planar faces above the support that a scan shows; none in a view without readings above it."""
     view = scan.view
-    sigma = _sigma(view)
+    sigma = noise_image(view)
     points = apply(view.T_world_sensor, view.points_sensor())
     height = points[..., 2]
     with np.errstate(invalid="ignore"):
@@ -64,13 +63,6 @@ def patch_at(patches: Patches, u: float, v: float, reach_px: int = 4) -> Patch |
     nearest = int(np.argmin((rows + top - v) ** 2 + (columns + left - u) ** 2))
     number = int(near[rows[nearest], columns[nearest]])
     return patches.patches[number]
-
-
-def _sigma(view: DepthView) -> NDArray:
-    known = np.isfinite(view.depth)
-    sigma = np.full(view.depth.shape, np.nan)
-    sigma[known] = sigma_at(view, view.depth[known])
-    return sigma
 
 
 def _without_slivers(labels: NDArray, options: PatchOptions) -> NDArray:
@@ -131,7 +123,7 @@ def _told(view: DepthView, labels: NDArray, planes: NDArray, sigma: NDArray, poi
     creases = tuple(Crease(int(number[c.a]), int(number[c.b]), c.convex, c.readings) for c in creases if number[[c.a, c.b]].min() >= 0)
     patches = []
     for new, k in enumerate(kept):
-        rings = tuple(outline.ring for outline in outlines[k])
+        rings = tuple(outline.corners for outline in outlines[k])
         borders = tuple(tuple(Border(b.kind, int(number[b.other]), b.sigma) for b in outline.borders) for outline in outlines[k])
         on = points[parts[k]][labels[parts[k]] == new]
         rms, bend, tilt = _flatness(on, planes[k])

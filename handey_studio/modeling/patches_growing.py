@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from handey_studio.modeling.patches_windows import Field
+from handey_studio.modeling.patches_windows import Field, plane_of_sums
 from handey_studio.sensing.drawing import Camera
 
 ON_SIGMAS = 3.5  # a reading so near lies on the plane
@@ -59,17 +59,6 @@ def _normal(c0, cu, cv, camera):
 
 
 @njit(cache=True, error_model="numpy")
-def _fit(s):
-    """Plane (value at pixel 0, changes) of sums n, u, v, uu, uv, vv, q, qu, qv."""
-    n, mu, mv, mq = s[0], s[1] / s[0], s[2] / s[0], s[6] / s[0]
-    uu, uv, vv = s[3] - n * mu * mu, s[4] - n * mu * mv, s[5] - n * mv * mv
-    qu, qv = s[7] - n * mq * mu, s[8] - n * mq * mv
-    det = uu * vv - uv * uv
-    cu, cv = (vv * qu - uv * qv) / det, (uu * qv - uv * qu) / det
-    return mq - cu * mu - cv * mv, cu, cv
-
-
-@njit(cache=True, error_model="numpy")
 def _add(s, i, j, q):
     s[0] += 1.0
     s[1] += i
@@ -117,7 +106,7 @@ def _grow(value, sigma, flat, seeds, camera):
             first += 1
             _add(s, i, j, value[j, i])
             if s[0] >= refit:
-                c0, cu, cv = _fit(s)
+                c0, cu, cv, _ = plane_of_sums(s)
                 normal = _normal(c0, cu, cv, camera)
                 refit = REFIT_GROWTH * s[0]
             for y in range(max(0, j - REACH_PX), min(height, j + REACH_PX + 1)):
@@ -151,12 +140,12 @@ def _moments(value, labels, count):
 
 
 def _solved(sums: NDArray) -> NDArray:
-    return np.array([_fit(s) if s[0] >= 3 else (np.nan,) * 3 for s in sums]).reshape(-1, 3)
+    return np.array([plane_of_sums(s)[:3] if s[0] >= 3 else (np.nan,) * 3 for s in sums]).reshape(-1, 3)
 
 
 def _rms(s: NDArray) -> float:
     """Of the value, off the plane through the readings that were summed."""
-    c0, cu, cv = _fit(s)
+    c0, cu, cv, _ = plane_of_sums(s)
     return float(np.sqrt(max(0.0, s[9] - c0 * s[6] - cu * s[7] - cv * s[8]) / max(1.0, s[0] - 3.0)))
 
 
@@ -194,7 +183,7 @@ def _merged(field: Field, labels: NDArray, count: int, camera: Camera) -> NDArra
             break
         sums[a] += sums[b]
         root[root == b] = a
-        planes[a] = _fit(sums[a])
+        planes[a] = plane_of_sums(sums[a])[:3]
         normals[a] = normals_of(planes[a : a + 1], camera)[0]
         touched = {x if y in (a, b) else y for x, y in likeness if (x in (a, b)) != (y in (a, b))}
         likeness = {pair: value for pair, value in likeness.items() if a not in pair and b not in pair}

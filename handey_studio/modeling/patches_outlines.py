@@ -34,10 +34,10 @@ class Contour(NamedTuple):
     others: NDArray
 
 
-class Outline(NamedTuple):
-    """`ring` (n, 3) [m] in the world's frame and what its sides are."""
+class Ring(NamedTuple):
+    """One outline of a patch: `corners` (n, 3) [m] in the world's frame and what its sides are."""
 
-    ring: NDArray
+    corners: NDArray
     borders: tuple[Border, ...]
 
 
@@ -60,7 +60,7 @@ def contours_of(seen: Seen, number: int, part: tuple[slice, slice]) -> list[Cont
     return found
 
 
-def outlines_of(seen: Seen, number: int, contours: Sequence[Contour]) -> list[Outline]:
+def outlines_of(seen: Seen, number: int, contours: Sequence[Contour]) -> list[Ring]:
     """The outer outline of a patch, counter-clockwise seen from outside, and those of its holes, clockwise; empty when it has none."""
     found = [_outline(seen, number, contour) for contour in contours]
     return [outline for outline in found if outline is not None] if found and found[0] is not None else []
@@ -86,18 +86,18 @@ def _is_hole(seen: Seen, contour: NDArray, left: int, top: int) -> bool:
     return bool(np.isfinite(seen.view.depth[v + low[1] + top, u + low[0] + left]).mean() > LEAST_HOLE)
 
 
-def _outline(seen: Seen, number: int, contour: Contour) -> Outline | None:
+def _outline(seen: Seen, number: int, contour: Contour) -> Ring | None:
     """The outline with straight sides of a contour of patch `number`; None if it cannot be had without crossings."""
     if len(contour.pixels) < 8:
         return None
     pixels_per_m = scale_of(seen, contour.pixels, number)
     for coarser in COARSER:
         found = _polygon(seen, number, contour, _slack(seen, pixels_per_m) * coarser, pixels_per_m)
-        if found is not None and is_simple(found.ring, seen.planes[number, :3]):
+        if found is not None and is_simple(found.corners, seen.planes[number, :3]):
             ring, borders = found
             if (_signed_area(ring, seen.planes[number, :3]) < 0) != contour.hole:
                 ring, borders = ring[::-1], (*borders[-2::-1], borders[-1])
-            return Outline(ring, borders)
+            return Ring(ring, borders)
     return None
 
 
@@ -106,7 +106,7 @@ def _slack(seen: Seen, pixels_per_m: float) -> float:
     return max(SIMPLE_PX, RAGGED * seen.view.outline_error * pixels_per_m)
 
 
-def _polygon(seen: Seen, number: int, contour: Contour, slack: float, pixels_per_m: float) -> Outline | None:
+def _polygon(seen: Seen, number: int, contour: Contour, slack: float, pixels_per_m: float) -> Ring | None:
     """Straight sides that leave the contour by at most about `slack` [px]."""
     corners = _corner_numbers(contour.pixels, slack)
     if len(corners) < 3:
@@ -120,7 +120,7 @@ def _polygon(seen: Seen, number: int, contour: Contour, slack: float, pixels_per
         corners = _met(sides, places, slack)
         drop = next((k for k in (_repeated(sides), _needless(sides, places, slack), _pointless(corners)) if k is not None), None)
         if drop is None:
-            return Outline(lifted(seen, number, corners), tuple(side.border for side in sides))
+            return Ring(lifted(seen, number, corners), tuple(side.border for side in sides))
         sides.pop(drop)
         places = np.delete(places, drop, axis=0)
     return None

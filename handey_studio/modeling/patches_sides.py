@@ -11,20 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import apply, rotate
-from handey_studio.modeling.patches import Border
+from handey_studio.modeling.patches import SUPPORT, Border
 from handey_studio.sensing.depth_view import DepthView
 
 FAR_PX = 45  # beyond a contour the next reading is looked for so far: shadows are wide
 SAME_SURFACE_SIGMAS = 6.0
 NEAR_CREASE_PX = 5.0  # a crease that the planes put farther from the contour is not used
 PARALLEL_RAD = np.deg2rad(12.0)
-SUPPORT = -2
 MOST_LOST_M = 0.0025  # depth cameras lose 3 to 5 mm; what is measured beyond comes from other things beside the outlines
 SCATTER = np.sqrt(3.0)  # deviations between the mean of what is spread evenly and its end
-DRIFTS = 4.0  # a rim that drifts by so much [px] is lost by up to so many times as much
+DRIFTS = 5.0  # a rim that drifts by so much [px] is lost by up to so many times as much
 DRIFT_PX, MOST_OFF_PX, LEAST_RIM_PX = 2, 3.0, 16  # pixels so far apart drift alike but err each for itself; on a rim so long
-CHANCE_PX2 = 0.05  # that much they have in common by whole pixels and chance
-MOST_SLANT = 1.5  # surfaces seen flatly lose more of their rims, up to so many times as much
+CHANCE_PX2 = 0.1  # px²: that much they have in common by whole pixels and chance
+MOST_SLANT = 1.3  # surfaces seen flatly lose more of their rims, up to so many times as much
 LOST_UNSURE, LEAST_UNSURE_PX = 0.35, 0.1  # what a sensor loses at rims is known to so much of it, and to so much at best
 LEAST_OFF_PX, ALIKE_PX = 0.3, 6.0  # a contour's pixels err by so much at least, and so many neighbours alike
 NAMES = {"r": "rim", "k": "cut", "i": "image"}

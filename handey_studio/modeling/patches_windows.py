@@ -1,5 +1,6 @@
 """A plane at each reading: of all small windows that hold it, the one that lies flattest, so that edges do not blur."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from handey_studio.sensing.facets import sigma_at
 LEAST_SIDE_PX, MOST_SIDE_PX = 5, 15
 NORMAL_RAD = 0.045  # a window is as large as it takes for its normal to be this good
 FILLED = 0.5  # of its pixels
+LEAST_SPREAD = 1e-6  # px⁴ a reading: less lie on a line
 
 
 class Field(NamedTuple):
@@ -28,9 +30,7 @@ def field_of(view: DepthView, wanted: NDArray) -> Field:
     """The readings `wanted` (H, W) with their planes."""
     depth = np.where(wanted, view.depth, np.nan)
     pinhole = isinstance(view.projection, Pinhole)
-    known = np.isfinite(depth)
-    sigma = np.full(depth.shape, np.nan)
-    sigma[known] = sigma_at(view, depth[known])
+    sigma = noise_image(replace(view, depth=depth))
     if pinhole:
         with np.errstate(divide="ignore", invalid="ignore"):
             value, sigma = 1.0 / depth, sigma / depth**2
@@ -47,6 +47,14 @@ def field_of(view: DepthView, wanted: NDArray) -> Field:
         found[..., 0] -= found[..., 1] * left + found[..., 2] * top
         flat[part] = found
     return Field(np.ascontiguousarray(value), np.ascontiguousarray(sigma), flat)
+
+
+def noise_image(view: DepthView) -> NDArray:
+    """Standard deviation (H, W) [m] of each reading, NaN where there is none."""
+    known = np.isfinite(view.depth)
+    sigma = np.full(view.depth.shape, np.nan)
+    sigma[known] = sigma_at(view, view.depth[known])
+    return sigma
 
 
 def _side(view: DepthView) -> int:
@@ -89,6 +97,18 @@ def _window_planes(value: NDArray, sigma: NDArray, half: int) -> NDArray:
 
 
 @njit(cache=True, error_model="numpy")
+def plane_of_sums(s):
+    """The least-squares plane of sums n, u, v, uu, uv, vv, q, qu, qv: value at pixel 0, changes along u and v; and how far the readings
+    spread over an area, 0 for those on a line."""
+    n, mu, mv, mq = s[0], s[1] / s[0], s[2] / s[0], s[6] / s[0]
+    uu, uv, vv = s[3] - n * mu * mu, s[4] - n * mu * mv, s[5] - n * mv * mv
+    qu, qv = s[7] - n * mq * mu, s[8] - n * mq * mv
+    spread = uu * vv - uv * uv
+    cu, cv = (vv * qu - uv * qv) / spread, (uu * qv - uv * qu) / spread
+    return mq - cu * mu - cv * mv, cu, cv, spread
+
+
+@njit(cache=True, error_model="numpy")
 def _planes_of_sums(value, sigma, sums, middle, half):
     height, width = value.shape
     out = np.full((height, width, 4), np.nan)
@@ -102,22 +122,18 @@ def _planes_of_sums(value, sigma, sums, middle, half):
                 s[k] = sums[bottom, right, k] - sums[top, right, k] - sums[bottom, left, k] + sums[top, left, k]
             if s[0] < least or not np.isfinite(value[j, i]):
                 continue
-            n, mu, mv, mq = s[0], s[1] / s[0], s[2] / s[0], s[6] / s[0]
-            uu, uv, vv = s[3] - n * mu * mu, s[4] - n * mu * mv, s[5] - n * mv * mv
-            qu, qv = s[7] - n * mq * mu, s[8] - n * mq * mv
-            det = uu * vv - uv * uv
-            if det < 1e-6 * n:
+            c0, cu, cv, spread = plane_of_sums(s)
+            if spread < LEAST_SPREAD * s[0]:
                 continue
-            cu, cv = (vv * qu - uv * qv) / det, (uu * qv - uv * qu) / det
             off = 0.0
             for y in range(top, bottom):
                 for x in range(left, right):
                     if np.isfinite(value[y, x]):
-                        e = value[y, x] - middle - mq - cu * (x - mu) - cv * (y - mv)
+                        e = value[y, x] - middle - c0 - cu * x - cv * y
                         off += e * e
-            out[j, i, 0] = middle + mq + cu * (i - mu) + cv * (j - mv)
+            out[j, i, 0] = middle + c0 + cu * i + cv * j
             out[j, i, 1], out[j, i, 2] = cu, cv
-            out[j, i, 3] = np.sqrt(off / max(n - 3.0, 1.0)) / sigma[j, i]
+            out[j, i, 3] = np.sqrt(off / max(s[0] - 3.0, 1.0)) / sigma[j, i]
     return out
 
 

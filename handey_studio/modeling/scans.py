@@ -11,6 +11,8 @@ from handey_studio.sensing.depth_view import DepthView
 from handey_studio.sensing.files import DepthReading, read_depth
 from handey_studio.sensing.support import support_plane
 
+CELL_SCAN = "range finder"  # the source of the cell's own scans
+
 
 @dataclass(frozen=True, eq=False)
 class Scan(Value):
@@ -23,7 +25,7 @@ class Scan(Value):
 
 def scan_of_map(name: str, depth_map: DepthMap) -> Scan:
     """The cell's depth map as a scan: seen from above by parallel light, in the cell's world."""
-    return Scan(name, depth_map.view(), "range finder")
+    return Scan(name, depth_map.view(), CELL_SCAN)
 
 
 def scan_of_view(name: str, view: DepthView, source: str, rng: np.random.Generator | None = None) -> Scan:

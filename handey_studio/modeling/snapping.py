@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from handey_studio.base import Value
 from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import apply, inverse, rotate
-from handey_studio.modeling.patches import Patches
+from handey_studio.modeling.patches import SUPPORT, Patches
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.sightlines import meets_readings
 from handey_studio.modeling.snap import MODEL, Ray, Snap, SnapOptions
 from handey_studio.modeling.snap_features import Features, corners_of, edges_of
 
-SUPPORT = -2  # the support's number among a scan's patches, as in `Patches.labels`
 GRAZING = 0.1  # a plane that the ray meets at a smaller sine: the reading is projected straight onto it
 
 

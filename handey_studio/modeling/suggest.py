@@ -13,9 +13,12 @@ from handey_studio.modeling.patches import Patches
 from handey_studio.modeling.patches_finding import patch_at, patches_of
 from handey_studio.modeling.patches_sides import lost_at_rims
 from handey_studio.modeling.scans import Scan
+from handey_studio.modeling.suggest_candidates import shapes_of
+from handey_studio.modeling.suggest_clues import Body
 from handey_studio.modeling.suggest_fit import Fit, Rays, fit_of, rays_of
-from handey_studio.modeling.suggest_planes import Body, BodyPlane, Squared, body_planes
-from handey_studio.modeling.suggest_shapes import Shape, shapes_of
+from handey_studio.modeling.suggest_planes import BodyPlane, body_planes
+from handey_studio.modeling.suggest_shapes import Shape
+from handey_studio.modeling.suggest_squares import Squared
 from handey_studio.modeling.suggestion import Relation, Suggestion
 
 SAME_PLANE_M, SAME_PLANE_COSINE = 0.0006, np.cos(np.deg2rad(0.5))  # a face of the solid and the plane that it was made from
@@ -63,12 +66,6 @@ def suggest(
     return suggest_object(scans, Ts, patches, scan, picked, options)
 
 
-def suggest_all(scan: Scan, patches: Patches | None = None, options: SuggestOptions = SuggestOptions()) -> tuple[Suggestion, ...]:
-    """A suggestion for each object of a scan, in the order of `Patches.objects`, the largest first."""
-    found = patches_of(scan) if patches is None else patches
-    return tuple(suggest_object([scan], [np.eye(4)], [found], 0, k, options) for k in range(len(found.objects)))
-
-
 def suggest_object(
     scans: Sequence[Scan],
     Ts: Sequence[NDArray],
@@ -87,11 +84,11 @@ def suggest_object(
         fit = None if shape.solid is None else fit_of(shape.solid, views)
         value = _judged(ledger, shape, fit, frame, options)
         if shape.solid is not None and fit is not None and value is not None and (best is None or value > best[0]):
-            best = (value, shape.solid, fit)
+            best = (value, shape.solid, fit, shape.by)
     if best is None:
         return _none(_why(ledger.entries), ledger.entries, tuple(body.of_all()))
-    _, solid, fit = best
-    sources = tuple(_source(solid, f, planes, body) for f in range(len(solid.faces)))
+    _, solid, fit, by = best
+    sources = tuple(_source(solid, f, planes, body, by) for f in range(len(solid.faces)))
     relations = _relations(solid, planes, squares)
     return Suggestion(solid, sources, relations, ledger.entries, fit.rms, fit.explained, tuple(body.of_all()))
 
@@ -177,8 +174,8 @@ def _match(solid: Polyhedron, f: int, planes: Sequence[BodyPlane]) -> BodyPlane 
     return None
 
 
-def _source(solid: Polyhedron, f: int, planes: Sequence[BodyPlane], body: Body) -> str:
-    """What a face rests on."""
+def _source(solid: Polyhedron, f: int, planes: Sequence[BodyPlane], body: Body, by: str) -> str:
+    """What a face rests on; what nothing shows is assumed `by`, "hidden" or "symmetric"."""
     plane = _match(solid, f, planes)
     if plane is not None:
         seen = [scan for scan, patch in plane.of if patch >= 0 and (scan, patch) in body.of_all()]
@@ -186,6 +183,8 @@ def _source(solid: Polyhedron, f: int, planes: Sequence[BodyPlane], body: Body) 
             return f"seen in scan {min(seen) + 1}"
         if plane.kind == "support":
             return "assumed: support"
+    elif by == "symmetric":
+        return "assumed: symmetric"
     parallel = any(other.kind == "seen" and abs(other.normal @ solid.normals[f]) > SAME_PLANE_COSINE for other in planes)
     return "assumed: parallel" if parallel else "assumed: hidden"
 

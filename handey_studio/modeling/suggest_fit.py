@@ -10,9 +10,8 @@ from scipy.ndimage import binary_erosion
 from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import apply, inverse, rotate
 from handey_studio.modeling.patches_sides import lost_at_rims
+from handey_studio.modeling.patches_windows import noise_image
 from handey_studio.modeling.scans import Scan
-from handey_studio.sensing.depth_view import DepthView
-from handey_studio.sensing.facets import sigma_at
 
 ON_SIGMAS, ON_BEND_M = 4.0, 0.0025  # a reading so near lies on the solid: noise, and how cartons bulge, as far as the noise allows that
 THROUGH_SIGMAS = 6.0  # a reading so far behind it has seen through it
@@ -61,14 +60,7 @@ def rays_of(scan: Scan, T_model_scan: NDArray, own: NDArray, corners_model: NDAr
     mine = own[v, u]
     scale = float(view.projection.pixels_per_metre(float(np.median(depth[mine])) if mine.any() else 1.0))
     margin = int(np.ceil((lost_at_rims(view) * scale + MARGIN_PX) / every))
-    return Rays(shape, apply(T, near), rotate(T, far - near), depth, _sigma(view, depth), mine, margin)
-
-
-def _sigma(view: DepthView, depth: NDArray) -> NDArray:
-    known = np.isfinite(depth)
-    sigma = np.ones(len(depth))
-    sigma[known] = sigma_at(view, depth[known])
-    return sigma
+    return Rays(shape, apply(T, near), rotate(T, far - near), depth, np.nan_to_num(noise_image(view)[v, u], nan=1.0), mine, margin)
 
 
 def fit_of(solid: Polyhedron, views: list[Rays]) -> Fit:

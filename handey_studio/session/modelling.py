@@ -3,16 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handey_studio.base import BadInput, Progress
 from handey_studio.cell.protocol import CannotAct
 from handey_studio.cell.turning import turned_over
 from handey_studio.geometry import Polyhedron
-from handey_studio.geometry.transforms import rotation_about
+from handey_studio.geometry.transforms import apply, inverse, rotation_about
 from handey_studio.modeling.draft import Draft
 from handey_studio.modeling.operations import TakeSuggestion
-from handey_studio.modeling.replay import Built
-from handey_studio.modeling.scans import scan_of_map
+from handey_studio.modeling.patches_finding import patches_of
+from handey_studio.modeling.replay import Built, replay
+from handey_studio.modeling.scans import CELL_SCAN, scan_of_map
 from handey_studio.modeling.truth_values import Truth
 from handey_studio.session.model_look import assumed_faces
 from handey_studio.session.run import cell_of, station_of
@@ -39,11 +41,29 @@ def scan_cell(session: Session, library: Library, execute: bool, progress: Progr
 def turn_over(session: Session, library: Library, execute: bool, progress: Progress) -> Session:
     """The session after a person turned the object in its simulated cell over; what was sensed and planned before is stale and goes.
 
-    Only the cell's hidden truth changes. Raises BadInput when there is nothing to turn.
+    It is the one that is being modelled, where a scan of the cell shows it, else the one nearest to the scan's middle. Only the cell's
+    hidden truth changes. Raises BadInput when there is nothing to turn.
     """
     progress.report(0.1, "The object is turned over by hand.")
     workcell = session.workcell if session.cell_now is None else replace(session.workcell, setup=session.cell_now)
-    return replace(session.without_findings(), cell_now=turned_over(workcell, library))
+    return replace(session.without_findings(), cell_now=turned_over(workcell, library, _modelled_at(session.draft)))
+
+
+def _modelled_at(draft: Draft | None) -> NDArray | None:
+    """Where in the cell (3,) [m] the object that is modelled lay in the last scan of the cell whose place is known: its solid's middle, or
+    while there is none, that of the largest object; None without such a scan."""
+    built = None if draft is None else replay(draft)
+    if draft is None or built is None:
+        return None
+    poses = dict(built.poses)
+    scan = next((scan for scan in reversed(draft.scans) if scan.source == CELL_SCAN and scan.name in poses), None)
+    if scan is None:
+        return None
+    if built.solid is not None:
+        return apply(inverse(poses[scan.name]), built.solid.vertices.min(axis=0) / 2.0 + built.solid.vertices.max(axis=0) / 2.0)
+    patches = patches_of(scan)
+    corners = [patches.patches[number].rings[0] for group in patches.objects[:1] for number in group]
+    return np.concatenate(corners).mean(axis=0) if corners else None
 
 
 def find_parts(session: Session, library: Library, execute: bool, progress: Progress) -> Session:

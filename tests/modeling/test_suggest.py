@@ -9,7 +9,7 @@ from handey_studio.modeling.patches_finding import patches_of
 from handey_studio.modeling.patches_growing import _grow
 from handey_studio.modeling.patches_windows import _window_planes
 from handey_studio.modeling.scans import Scan
-from handey_studio.modeling.suggest import suggest, suggest_all
+from handey_studio.modeling.suggest import suggest, suggest_object
 from handey_studio.modeling.suggest_fit import first_hits
 from handey_studio.modeling.suggest_report import aligned_box
 from handey_studio.modeling.suggest_warm_up import warm_up
@@ -63,7 +63,8 @@ def test_what_a_nearer_thing_hides_is_not_made_up():
     boxes = [(wide, box_pose(wide, 0.0, 0.0, 0.15)), (near, box_pose(near, 0.0, 0.1, -0.02))]
     scan = boxes_seen(boxes, np.random.default_rng(9), 0.0008, eye=np.array([0.1, -0.8, 0.3]))
     patches = patches_of(scan)
-    for group, found in zip(patches.objects, suggest_all(scan, patches), strict=True):
+    for number, group in enumerate(patches.objects):
+        found = suggest_object([scan], [np.eye(4)], [patches], 0, number)
         middle = np.mean([patches.patches[k].rings[0].mean(axis=0) for k in group], axis=0)
         if middle[1] > 0.08:
             assert found.solid is not None or found.reason
@@ -76,7 +77,7 @@ def test_the_upper_of_two_stacked_boxes_ends_on_the_lower():
     scan = boxes_seen(boxes, np.random.default_rng(10), 0.001)
     patches = patches_of(scan)
     top = max(patches.patches, key=lambda patch: patch.offset * (patch.normal[2] > 0.99))
-    found = suggest_all(scan, patches)[top.object]
+    found = suggest_object([scan], [np.eye(4)], [patches], 0, top.object)
     assert found.solid is not None
     assert np.abs(aligned_box(found.solid) - np.sort(over)).max() < 0.004
     assert abs(found.solid.vertices[:, 2].min() - 0.05) < 0.001
