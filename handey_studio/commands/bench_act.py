@@ -5,7 +5,6 @@ from pathlib import Path
 
 from handey_studio.base import BadInput
 from handey_studio.commands.arguments import DONE, check_output, positive, seeds, write_json
-from handey_studio.world import Library
 
 NAME = "bench act"
 HELP = "MOVEs carried out in the cell with forces: where the part truly came to stand, what was noticed and put right"
@@ -24,6 +23,7 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     from handey_studio.session.bench_kit import bench_kit
     from handey_studio.task.bench_act import Trial, bench_act, bench_act_faults
+    from handey_studio.world import Library
 
     check_output(given.json)
     trial = Trial(Library.choose(given.library), given.robot, given.attempts, kinds(given.faults))

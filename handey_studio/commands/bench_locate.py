@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 
 from handey_studio.commands.arguments import DONE, Lines, check_output, positive, seeds, write_json
-from handey_studio.world import Library
 
 NAME = "bench locate"
 HELP = "every part in many scenes: recall, precision, errors, time"
@@ -32,6 +31,7 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.task.bench_locate import run_bench
+    from handey_studio.world import Library
 
     for output in (given.json, given.plot):
         check_output(output)

@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 
 from handey_studio.commands.arguments import DONE, check_output, seeds, write_json
-from handey_studio.world import Library
 
 NAME = "bench moves"
 HELP = "one MOVE in each of many random scenes, judged against the hidden truth"
@@ -24,6 +23,7 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.task.bench_moves import bench_moves
+    from handey_studio.world import Library
 
     check_output(given.json)
     report = bench_moves(given.seeds or range(20), Library.choose(given.library), print, given.scenes, given.robot)

@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 
 from handey_studio.commands.arguments import DONE, FAILED, Lines, check_output, seeds, whole, write_json
-from handey_studio.world import Library
 
 NAME = "bench space"
 HELP = "configuration spaces: time from a new depth map, when one part moved, of a query; free cells held against exact collision"
@@ -21,6 +20,7 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     from handey_studio.task.bench_motion.space_cells import check_cells
     from handey_studio.task.bench_motion.space_times import cold_start, measure_spaces
+    from handey_studio.world import Library
 
     check_output(given.json)
     library, report, colliding = Library.choose(given.library), [], 0

@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from handey_studio.commands.arguments import DONE, FAILED, Lines, check_output, positive, write_json
-from handey_studio.geometry.transforms import from_xyz_rpy
-from handey_studio.world import Library
 
 NAME = "calibrate"
 HELP = "calibrate the range finder to the robot (§6): the hand shows a cube at several poses, each is scanned"
@@ -37,6 +35,7 @@ def run(given: argparse.Namespace) -> int:
     from handey_studio.session.run import station_of
     from handey_studio.task.calibrate import CalibrateOptions, calibrate_range
     from handey_studio.task.calibration_report import calibration_lines, calibration_report, truth_line
+    from handey_studio.world import Library
 
     for output in (given.json, given.save, given.save_before):
         check_output(output)
@@ -62,6 +61,8 @@ def run(given: argparse.Namespace) -> int:
 
 
 def _offset(text: str) -> np.ndarray:
+    from handey_studio.geometry.transforms import from_xyz_rpy
+
     try:
         x, y, z, yaw = (float(word) for word in text.split(","))
     except ValueError:

@@ -6,7 +6,6 @@ from pathlib import Path
 from handey_studio.base import BadInput
 from handey_studio.base.files import replace_file
 from handey_studio.commands.arguments import DONE, check_output
-from handey_studio.world import Library
 
 NAME = "export"
 HELP = "write a planned MOVE for a robot controller, after a dry check against the robot's limits"
@@ -25,6 +24,7 @@ def add_arguments(export: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.task.export import program_text, read_program
+    from handey_studio.world import Library
 
     out = given.out or given.move.with_suffix(SUFFIXES[given.format])
     check_output(out)

@@ -7,7 +7,6 @@ from pathlib import Path
 from handey_studio.base import BadInput
 from handey_studio.base.files import replace_file
 from handey_studio.commands.arguments import DONE, Lines, check_output, check_suffix, seeds, write_json
-from handey_studio.world import Library
 
 NAME = "fit score"
 HELP = "fit the weights of the localizer's score to the candidates in simulated scenes, and tell how well they hold on others"
@@ -23,6 +22,7 @@ def add_arguments(fit: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.task.bench_locate.fit_score import run_fit, toml
+    from handey_studio.world import Library
 
     for output in (given.out, given.json):
         check_output(output)

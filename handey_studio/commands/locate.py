@@ -11,7 +11,6 @@ import numpy as np
 
 from handey_studio.base import BadInput
 from handey_studio.commands.arguments import DONE, NOTHING_FOUND, check_output, positive, write_json
-from handey_studio.world import Library
 
 if TYPE_CHECKING:
     from handey_studio.sensing.depth_view import DepthView
@@ -38,6 +37,7 @@ def run(given: argparse.Namespace) -> int:
     from handey_studio.sensing.files import read_depth
     from handey_studio.sensing.report import seen_report
     from handey_studio.sensing.support import support_planes
+    from handey_studio.world import Library
 
     for output in (given.json, given.depth_map):
         check_output(output)

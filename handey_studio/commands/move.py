@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from handey_studio.base import BadInput, Entry, describe
 from handey_studio.commands.arguments import DONE, FAILED, Lines, check_output, positive, whole, write_json
-from handey_studio.world import Library
 
 if TYPE_CHECKING:
     from handey_studio.session import Session
     from handey_studio.task import MoveCommand, MoveResult
+    from handey_studio.world import Library
 
 NAME = "move"
 HELP = "run a session's MOVEs: sense, plan, execute"
@@ -74,6 +74,7 @@ class Watching(Lines):
 def opened(given: argparse.Namespace) -> "tuple[Session, Library]":
     """The session that is asked for, with the commands, robot and seed that are given."""
     from handey_studio.session import find_session, read_session
+    from handey_studio.world import Library
 
     for output in (given.json, given.save):
         check_output(output)
@@ -86,7 +87,7 @@ def opened(given: argparse.Namespace) -> "tuple[Session, Library]":
     return replace(session, commands=_commands(given, session), seed=seed, improve=improve), library
 
 
-def write_outputs(given: argparse.Namespace, session: "Session", library: Library, results: "Sequence[MoveResult]") -> None:
+def write_outputs(given: argparse.Namespace, session: "Session", library: "Library", results: "Sequence[MoveResult]") -> None:
     """The JSON and the session, where they are asked for."""
     from handey_studio.session import write_session
     from handey_studio.task.report import move_report

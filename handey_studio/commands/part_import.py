@@ -6,7 +6,6 @@ from pathlib import Path
 
 from handey_studio.base import measured
 from handey_studio.commands.arguments import DONE
-from handey_studio.world import Library
 
 NAME = "part import"
 HELP = "make a mesh or CAD file (OBJ, STL, PLY, OFF, STEP) a part of your library"
@@ -25,6 +24,7 @@ def add_arguments(importing: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.modeling.checks import solid_checks
+    from handey_studio.world import Library
     from handey_studio.world.importing import ImportOptions, import_part
     from handey_studio.world.part_writing import check_part_name, write_part
 

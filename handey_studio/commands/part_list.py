@@ -5,7 +5,6 @@ import sys
 
 from handey_studio.base import BadInput
 from handey_studio.commands.arguments import DONE
-from handey_studio.world import Library
 
 NAME = "part list"
 HELP = "the parts of the library, each with its size, mass and file"
@@ -17,6 +16,8 @@ def add_arguments(listing: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     import numpy as np
+
+    from handey_studio.world import Library
 
     library = Library.choose(given.library)
     drafts = library.drafts()

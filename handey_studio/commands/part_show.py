@@ -2,10 +2,13 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from handey_studio.base import measured
 from handey_studio.commands.arguments import BAD_INPUT, DONE, check_output, write_json
-from handey_studio.world import Library, Part
+
+if TYPE_CHECKING:
+    from handey_studio.world import Part
 
 NAME = "part show"
 HELP = "a part's size, volume, mass, symmetry, faces, checks, and its grasp classes for a robot's hand"
@@ -20,6 +23,7 @@ def add_arguments(show: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     from handey_studio.grasping import grasp_groups
     from handey_studio.modeling.checks import solid_checks
+    from handey_studio.world import Library
 
     check_output(given.json)
     library = Library.choose(given.library)
@@ -39,7 +43,7 @@ def run(given: argparse.Namespace) -> int:
     return DONE if all(check.ok for check in checks) else BAD_INPUT
 
 
-def _told(part: Part) -> list[str]:
+def _told(part: "Part") -> list[str]:
     """Where it came from."""
     told = part.provenance
     lines = [told.source] if told.source else []
@@ -54,7 +58,7 @@ def _told(part: Part) -> list[str]:
     return lines
 
 
-def _report(part: Part, checks: tuple, classes: int, groups: int) -> dict:
+def _report(part: "Part", checks: tuple, classes: int, groups: int) -> dict:
     volume, centre = part.solid.volume_and_centroid
     low, high = part.solid.vertices.min(axis=0), part.solid.vertices.max(axis=0)
     return {

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from handey_studio.commands.arguments import DONE, NOTHING_FOUND, Lines, check_output, write_json
-from handey_studio.world import Library
 
 NAME = "path"
 HELP = "a certified path between two configurations in a scene of boxes, cylinders and spheres (MoveIt's YAML)"
@@ -25,6 +24,7 @@ def add_arguments(path: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.motion.answer import answer_path, path_report
+    from handey_studio.world import Library
 
     check_output(given.json)
     robot = Library.choose(given.library).robot(given.robot)
@@ -34,7 +34,8 @@ def run(given: argparse.Namespace) -> int:
     seconds = ", ".join(f"{stage} {took:.2f} s" for stage, took in answer.timing_s.items())
     result, trajectory = answer.result, answer.trajectory
     if trajectory is None or result.certificate is None:
-        print(f"no path: {result.reason} ({seconds})", file=sys.stderr)
+        between = f"; in the way: {', '.join(result.separating)}" if result.separating else ""
+        print(f"no path: {result.reason}{between} ({seconds})", file=sys.stderr)
         return NOTHING_FOUND
     length = float(np.linalg.norm(np.diff(result.q_rad, axis=0), axis=1).sum())
     clearance = f"{1e3 * result.certificate.least_clearance:.1f} mm ({' and '.join(result.certificate.bodies)})"

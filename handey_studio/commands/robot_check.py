@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 
 from handey_studio.commands.arguments import BAD_INPUT, DONE
-from handey_studio.world import Library
 
 NAME = "robot check"
 HELP = "what is wrong with a robot folder, one sentence a finding, and what is right"
@@ -15,6 +14,7 @@ def add_arguments(check: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
+    from handey_studio.world import Library
     from handey_studio.world.robot_check import check_robot
 
     named = Library.choose(given.library).robot_folders()

@@ -3,7 +3,6 @@
 import argparse
 
 from handey_studio.commands.arguments import DONE
-from handey_studio.world import Library, load_robot
 
 NAME = "robot list"
 HELP = "the robots of the library, each with its joints and its folder"
@@ -14,6 +13,8 @@ def add_arguments(listing: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
+    from handey_studio.world import Library, load_robot
+
     for name, folder in sorted(Library.choose(given.library).robot_folders().items()):
         robot = load_robot(folder)
         held = f", {len(robot.held_joints)} of them held" if robot.held_joints else ""

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from handey_studio.commands.arguments import DONE, Lines, check_output, positive
-from handey_studio.world import Library
 
 NAME = "scan simulate"
 HELP = "photographs of a session's scene, to try scan and calibrate on"
@@ -31,6 +30,7 @@ def run(given: argparse.Namespace) -> int:
     from handey_studio.cell.scan_folders import FolderOptions, moved_steps, write_stage_folder, write_sweep_folder
     from handey_studio.session import find_session, read_session
     from handey_studio.session.run import cell_of
+    from handey_studio.world import Library
 
     library = Library.choose(given.library)
     session = read_session(find_session(library, given.session))

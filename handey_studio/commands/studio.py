@@ -3,7 +3,6 @@
 import argparse
 
 from handey_studio.commands.arguments import DONE, port
-from handey_studio.world import Library
 
 NAME = "studio"
 HELP = "open the workbench in the browser"
@@ -18,6 +17,7 @@ def add_arguments(studio: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     from handey_studio.app import run as serve
     from handey_studio.session import find_session
+    from handey_studio.world import Library
 
     library = Library.choose(given.library)
     serve(find_session(library, given.session), host=given.host, port=given.port, library=library)

@@ -205,7 +205,7 @@ def _spread_columns(tops: NDArray, gaps: NDArray, cell: float, clip: float, mine
             if tops[i, j] > 0:
                 for other in range(max(j - len(gaps), 0), min(j + len(gaps) + 1, ny)):
                     if other != j:
-                        _lower(best[other], above[j], gaps[abs(other - j) - 1])
+                        _lower(best[other], above[j], float(gaps[abs(other - j) - 1]))
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -217,7 +217,7 @@ def _spread(squares: NDArray, filled: NDArray, gaps: NDArray, mine: NDArray, out
         for other in filled:
             if other != i and abs(other - i) <= len(gaps):
                 for j in range(best.shape[0]):
-                    _lower(best[j], squares[other, j], gaps[abs(other - i) - 1])
+                    _lower(best[j], squares[other, j], float(gaps[abs(other - i) - 1]))
         best[:] = np.sqrt(best)
 
 
@@ -225,7 +225,7 @@ def _spread(squares: NDArray, filled: NDArray, gaps: NDArray, mine: NDArray, out
 def _lower(best: NDArray, squares: NDArray, gap: float) -> None:
     """Lowers a row to another's squares plus that of the gap."""
     for k in range(len(best)):
-        best[k] = min(best[k], squares[k] + gap)
+        best[k] = min(best[k], squares[k] + np.float32(gap))
 
 
 @njit(cache=True)
