@@ -16,6 +16,7 @@ from handey_studio.session import Session
 from handey_studio.session.calibrating import calibrated, cell_with_cube, misplaced
 from handey_studio.session.run import station_of
 from handey_studio.task.calibrate import CalibrateOptions, RangeCalibration, calibrate_range
+from handey_studio.task.calibration_report import calibration_lines
 from handey_studio.world import Library
 
 MOST_OFF_M = np.array([0.009, 0.009, 0.0003])  # of a misplacement that is drawn by chance: a table that seems to rise forbids every MOVE
@@ -55,7 +56,9 @@ def calibration_done(state: State, found: RangeCalibration) -> State:
     """The state when a calibration has ended: what was found waits to be accepted."""
     if found.fit is None:
         return replace(state, calibration=found).told(f"The calibration failed: {found.reason}", "bad")
-    return replace(state, calibration=found).told("The range finder's frame was found. Accept it, or discard it, in the Cell tab.", "good")
+    off = next((line.strip() for line in calibration_lines(found) if "believed" in line), "")
+    sentence = f"The range finder's frame was found: {off}. Accept it, or discard it, in the Cell tab."
+    return replace(state, calibration=found).told(sentence, "good")
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -121,18 +121,18 @@ class State:
     taken_up: bool = False
     loads: int = field(default=0)
 
-    @property
+    @cached_property
     def replay(self) -> Replay | None:
         """The attempt that is looked at, played over time: what really happened in it, or the plan while that is not carried out."""
         told = self.attempt
         return None if told is None else _replay(self.robot, told.plan, told.performance)
 
-    @property
+    @cached_property
     def attempts(self) -> tuple[Told, ...]:
         """All attempts of the result that is looked at."""
         return attempts_of(self.session.result) if self.session.result is not None else ()
 
-    @property
+    @cached_property
     def attempt(self) -> Told | None:
         """The one that is looked at, else the last."""
         return self.attempts[self.attempt_number] if self.attempts else None
@@ -143,12 +143,12 @@ class State:
         count, number = len(self.attempts), self.session.view.attempt
         return number if 0 <= number < count else count - 1
 
-    @property
+    @cached_property
     def moment(self) -> Moment | None:
         """What holds at the time that is looked at."""
         return self.replay.at(self.session.view.time_s) if self.replay is not None else None
 
-    @property
+    @cached_property
     def carry(self) -> Carry | None:
         """The carry of that plan that the timeline is in."""
         return self.replay.carry_at(self.session.view.time_s) if self.replay is not None else None

@@ -18,5 +18,12 @@ class CellPanel:
             self._calibration = CalibrationPanel(gui, send)
 
     def render(self, old: State | None, new: State) -> None:
+        if old is not None and _looks(old) == _looks(new):
+            return
         self._disturbing.render(old, new)
         self._calibration.render(old, new)
+
+
+def _looks(state: State) -> tuple:
+    setup, plan = state.session.workcell.setup, state.attempt.plan if state.attempt is not None else None
+    return state.loads, state.job, setup.physics, setup.faults, id(setup), id(plan), id(state.calibration), state.outcomes

@@ -84,10 +84,11 @@ def ghost_pose(state: State) -> NDArray | None:
 
 def _arrived(state: State) -> bool:
     """Whether the part stands at its destination at the time that is looked at, so that a ghost there would only blur it."""
-    replay, pose = state.replay, ghost_pose(state)
-    if replay is None or pose is None or not replay.let_go(state.session.view.time_s):
+    replay = state.replay
+    if replay is None or not replay.let_go(state.session.view.time_s):
         return False
-    return bool(np.allclose(replay.plan.T_world_part_goal, pose, atol=1e-6))
+    pose = ghost_pose(state)
+    return pose is not None and bool(np.allclose(replay.plan.T_world_part_goal, pose, atol=1e-6))
 
 
 def _pose_of(gizmo: Any) -> NDArray:
