@@ -52,8 +52,9 @@ def plan_path(
 ) -> PathResult:
     """A certified path from `start` to `goal` (joints,) [rad], with the fingers `opening` [m] apart around `held`.
 
-    Straight, if that is free. Else the paper's three legs in the slice configuration space; a layer of it for the wrist at each end;
-    other ways of the wrist; finer cells; and at last random trees over all joints. `needed` of the result tells.
+    Straight, if that is free. Else the paper's three legs in the slice configuration space, and more legs at an end that no straight one
+    leaves; the wrist turned at one place, by other ways too; a tighter wrist box for each part of its way; finer cells; and at last random
+    trees over all joints. `needed` of the result tells.
 
     Pairs in `allowed_start` may touch on the leg that leaves the start, those in `allowed_goal` on the leg that arrives at the goal. No
     path found comes back as status "none" with every attempt in `entries`. Without `rng` short cuts and trees are drawn from seed 0.
@@ -76,7 +77,7 @@ def plan_path(
         if attempt.proven or progress.cancelled:
             return _none(asked, attempt.reason if attempt.proven else "cancelled", ledger, space, attempt.proven)
     reasons = dict.fromkeys(entry.reason for entry in ledger.entries if entry.reason)
-    return _none(asked, "; ".join(reasons), ledger, space, False)
+    return _none(asked, f"none is found with cells down to {min(asked.options.steps_deg):g}°: {'; '.join(reasons)}", ledger, space, False)
 
 
 def _none(asked: Query, reason: str, ledger: Ledger, space: CSpaceSummary | None, proven: bool) -> PathResult:
@@ -120,7 +121,7 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
 
 def _trees(asked: Query, most: int, rng: np.random.Generator, progress: Progress) -> Attempt:
     points, movers, grown = grow_trees(asked, most, rng, progress)
-    why = "" if len(points) else f"random trees did not meet in {grown} growths"
+    why = "" if len(points) else "the random trees did not meet"
     return Attempt(f"random trees, {grown} growths", points, movers, None, why)
 
 

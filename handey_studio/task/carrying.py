@@ -104,9 +104,10 @@ def join(
 
 
 def _note(found: PathResult, what: str, holding: str, posture: Posture, entry: int, ledger: Ledger) -> None:
-    """A free motion in the ledger, with what planning it tried."""
+    """A free motion in the ledger, with what planning it tried, and what stands between its ends if there is none."""
     fell = None if found.found else found.reason
-    below = ledger.add("arm motion", f"{what}, {holding}" if holding else what, fell, parent=entry, posture=posture if fell else None)
+    option = f"{what}, {holding}" if holding else what
+    below = ledger.add("arm motion", option, fell, parent=entry, posture=posture if fell else None, bodies=found.separating)
     ledger.adopt(found.entries, parent=below)
 
 
