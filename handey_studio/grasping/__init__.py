@@ -21,7 +21,7 @@ from handey_studio.grasping.placements import Placement, PlacementOptions, stabl
 from handey_studio.grasping.plane_outlines import PlaneOutline, plane_outlines
 from handey_studio.grasping.plane_search import SearchOptions, plane_space
 from handey_studio.grasping.ranking import RankTerms, rank_terms
-from handey_studio.grasping.reach import within_reach
+from handey_studio.grasping.reach import reached_at, within_reach
 from handey_studio.grasping.regrasps import GOAL, START, RegraspSequence, SequenceCosts, Transfer, sequences, why_none
 from handey_studio.grasping.rotations import (
     HAND_MARGIN_M,
@@ -34,6 +34,7 @@ from handey_studio.grasping.rotations import (
     tilt,
 )
 from handey_studio.grasping.stability import Grip, GripOptions, PadWrenches, gravity_in_hand, grip_margin, pad_wrenches
+from handey_studio.grasping.standing import topples_by
 
 __all__ = [
     "GOAL",
@@ -93,10 +94,12 @@ __all__ = [
     "plane_outlines",
     "plane_space",
     "rank_terms",
+    "reached_at",
     "sequences",
     "stable_placements",
     "tilt",
     "tilts_at",
+    "topples_by",
     "why_none",
     "within_reach",
 ]

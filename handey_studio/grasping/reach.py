@@ -5,11 +5,14 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
+from handey_studio.grasping.grasp_placement_table import GraspPlacementTable
 from handey_studio.grasping.rotations import ENDS, End, ForbiddenRange, GraspEnd, LegalRotations
 from handey_studio.world import Robot, arm_of
 
 LEAST_MARGIN_RAD = np.deg2rad(3.0)  # a branch keeps this from every joint limit
+TURNED = np.diag([-1.0, -1.0, 1.0, 1.0])  # the hand looks the same with its fingers swapped
 TOGETHER: list[End] = ["both"]
 
 
@@ -31,6 +34,15 @@ def within_reach(rotations: LegalRotations, pickup: GraspEnd, putdown: GraspEnd,
     beyond: list[End] = [name for name, end in ends.items() if not any(reached(angle, (end,)) for angle in looked_at)]
     lost = [ForbiddenRange(low, high, name, "", "reach") for name in beyond or TOGETHER for low, high in rotations.ranges()]
     return [], replace(rotations, forbidden=(*rotations.forbidden, *lost))
+
+
+def reached_at(table: GraspPlacementTable, end: GraspEnd, columns: NDArray) -> NDArray:
+    """Which of some `columns` (c,) of the table, given as a mask, the arm reaches at one end, either way round of the hand."""
+    found, robot = np.zeros(len(columns), dtype=bool), end.world.robot
+    for c in np.nonzero(columns)[0]:
+        T_world_hand = end.T_world_part @ table.Ts_part_hand[c]
+        found[c] = any(_reached(robot, (T_world_hand @ turn).tobytes()) for turn in (np.eye(4), TURNED))
+    return found
 
 
 @lru_cache(maxsize=8192)

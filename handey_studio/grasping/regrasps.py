@@ -145,7 +145,7 @@ def why_none(table: GraspPlacementTable, start: NDArray, goal: NDArray) -> str:
     from_start, to_goal = np.isfinite(start), np.isfinite(goal)
     for where, legal in (("start", from_start), ("goal", to_goal)):
         if not legal.any():
-            return f"none of the part's grasps is legal at the {where}"
+            return f"none of the part's grasps is legal and in reach at the {where}"
         if not (table.legal & legal).any():
             return f"of the {legal.sum()} grasps that are legal at the {where} none is legal at any of {len(table.placements)} placements"
     reached, held = np.zeros(len(table.legal), dtype=bool), from_start

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,8 @@ def _raise_terrain(heights: NDArray, seen: NDArray, terrain: HeightField, world:
     top = np.minimum(np.where(np.isnan(field.top), np.inf, field.top) + field.T_world_range[2, 3], float(world.free_space[1, 2]))
     top = np.where(top <= world.table_z + TABLE_SKIN_M, world.table_z, top)
     j, i = np.meshgrid(*(np.arange(n) for n in top.shape), indexing="ij")
-    for dx, dy in ((0.001, 0.001), (0.001, 0.999), (0.999, 0.001), (0.999, 0.999), (0.5, 0.5)):
+    shares = np.linspace(0.001, 0.999, max(3, int(np.ceil(field.cell / cell)) + 1))  # no farther apart than the cells of the grid
+    for dx, dy in product(shares, shares):
         points = apply(field.T_world_range, np.stack([(i + dx) * field.cell, (j + dy) * field.cell, np.zeros(i.shape)], axis=-1))
         cells = np.floor((points[..., :2] - origin) / cell).astype(int)
         known = ((cells >= 0) & (cells < heights.shape)).all(axis=-1)

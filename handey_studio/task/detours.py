@@ -17,6 +17,7 @@ from handey_studio.grasping import (
     free_patches,
     grasp_placement_table,
     legal_at,
+    reached_at,
     sequences,
     tilts_at,
     why_none,
@@ -52,8 +53,8 @@ def detours(goal: Goal, most: int, ledger: Ledger) -> Iterator[tuple[Goal, ...]]
 
 
 def _costs(table: GraspPlacementTable, end: GraspEnd) -> NDArray:
-    """What each grasp of the table costs at one end (c,): the fingers' tilt [rad], infinity where it is not legal."""
-    return np.where(legal_at(table, end), tilts_at(table, end.T_world_part), np.inf)
+    """What each grasp of the table costs at one end (c,): the fingers' tilt [rad], infinity where it is not legal or out of reach."""
+    return np.where(reached_at(table, end, legal_at(table, end)), tilts_at(table, end.T_world_part), np.inf)
 
 
 def _by_placements(table: GraspPlacementTable, start: NDArray, end: NDArray, most: int) -> Iterator[Series]:

@@ -14,8 +14,8 @@ from handey_studio.task.carrying import Start
 from handey_studio.task.destination import Area, base_name, goal_poses, parse_destination
 from handey_studio.task.options import Goal, check_goal
 from handey_studio.task.plan import MoveCommand, MovePlan, MoveResult
-from handey_studio.task.reasons import EFFORT_SPENT, why_no_goal, why_no_plan
-from handey_studio.task.search import OptionSearch, SearchOptions, settle
+from handey_studio.task.reasons import EFFORT_SPENT, settle, why_no_goal, why_no_plan
+from handey_studio.task.search import OptionSearch, SearchOptions
 from handey_studio.world import Part, PlacedPart, World
 
 SETTLED_M = 0.02  # nearer than this to where it was put it is the same part, whatever the naming of its symmetries

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Value, frozen_array
 from handey_studio.geometry.transforms import from_xyz_rpy
-from handey_studio.grasping import GraspEnd, GraspGroup, grasp_groups, opening_around, rank_terms
+from handey_studio.grasping import GraspEnd, GraspGroup, grasp_groups, opening_around, rank_terms, topples_by
 from handey_studio.world import PlacedPart, World
 from handey_studio.world.collision import ALLOWED_DEPTH_M
 from handey_studio.world.support import MAX_GAP_M, TOUCHING_M, Neighbour, neighbours
@@ -93,6 +93,11 @@ def check_goal(
     if not any(neighbour.below for neighbour in near):
         height = placed.corners_world[:, 2].min() - world.table_z
         ledger.fall(entry, "nothing holds the part up at the destination", value=height, limit=MAX_GAP_M, unit="m")
+        return None
+    beyond = topples_by(carried, placed)
+    if beyond > 0.0:
+        words = "the part would fall over at the destination: its centre of mass is not above what it stands on"
+        ledger.fall(entry, words, value=beyond, limit=0.0, unit="m")
         return None
     if _in_the_way(beside, "something lies on the part where it is", placed.name, entry, ledger):
         return None

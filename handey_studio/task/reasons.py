@@ -1,14 +1,30 @@
 """Why a MOVE could not be planned, in a sentence: what its ledger comes to."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 
-from handey_studio.base import Entry, describe
-from handey_studio.base.ledger import measured
+from handey_studio.base import Entry, Ledger, describe, measured
 from handey_studio.world import World
 
 MOST_REASONS = 3  # of the grasp groups that are told, the commonest first
 MOST_BODIES = 2  # that are named with each
 EFFORT_SPENT = "not looked at: the effort is spent"
+GAVE_WAY = {
+    "grasp group": "nothing works at any of its hand angles",
+    "approach": "neither way round works",
+    "hand": "no pair of arm configurations works",
+}
+
+
+def settle(ledger: Ledger, waiting: set[int]) -> None:
+    """Options below which everything fell have fallen themselves; those in `waiting`, with something untested below, stand."""
+    standing, below = set(waiting), {entry.parent for entry in ledger.entries}
+    for entry in reversed(ledger.entries):
+        if entry.reason is not None or entry.parent is None or entry.stage not in (*GAVE_WAY, "arm"):
+            continue
+        if entry.stage == "arm" or entry.id in standing or entry.id not in below:
+            standing.add(entry.parent)
+        else:
+            ledger.fall(entry.id, GAVE_WAY[entry.stage])
 
 
 def why_no_goal(world: World, candidates: int, part: str, to: str, entries: tuple[Entry, ...]) -> str:
@@ -27,18 +43,32 @@ def why_no_plan(entries: tuple[Entry, ...]) -> str:
     """Why no option was left: the commonest reasons and what met what, whether a regrasp would be the way, and what was not looked at."""
     groups = [entry for entry in entries if entry.stage == "grasp group" and entry.reason]
     if groups:
-        reasons = Counter(entry.reason or "" for entry in groups).most_common(MOST_REASONS)
-        said = "; ".join(f"{count} × {reason}{_bodies(groups, reason)}" for reason, count in reasons)
-        words = f"none of {len(groups)} grasp groups works: {said}{_why_no_detour(entries)}"
+        words = f"none of {len(groups)} grasp groups works: {_commonest(groups, entries)}{_why_no_detour(entries)}"
     else:
         words = f"the hand cannot grasp this part: {_why_no_groups(entries)}"
     return words + "".join(f"; {entry.option} were {describe(entry)}" for entry in entries if entry.reason == EFFORT_SPENT)
 
 
-def _bodies(groups: list[Entry], reason: str) -> str:
-    """The bodies that most groups fell to for a reason."""
-    met = Counter(body for entry in groups if entry.reason == reason for body in entry.bodies)
-    return f" ({', '.join(body for body, _ in met.most_common(MOST_BODIES))})" if met else ""
+def _commonest(groups: list[Entry], entries: tuple[Entry, ...]) -> str:
+    """What most groups fell for, with the bodies that were met most often; of those that gave way below, what fell there most often."""
+    below: dict[int | None, list[Entry]] = defaultdict(list)
+    for entry in entries:
+        below[entry.parent].append(entry)
+    counts, met = Counter(), defaultdict(Counter)
+    for group in groups:
+        fallen = _ends_below(group, below)
+        reason, _ = Counter(entry.reason or "" for entry in fallen).most_common(1)[0]
+        counts[reason] += 1
+        met[reason].update(body for entry in fallen if entry.reason == reason for body in entry.bodies)
+    named = {reason: ", ".join(body for body, _ in met[reason].most_common(MOST_BODIES)) for reason in counts}
+    said = (f"{count} × {reason}{f' ({named[reason]})' if named[reason] else ''}" for reason, count in counts.most_common(MOST_REASONS))
+    return "; ".join(said)
+
+
+def _ends_below(entry: Entry, below: dict[int | None, list[Entry]]) -> list[Entry]:
+    """The entries at which everything below an entry ended; itself if nothing fell below it."""
+    ends = [end for child in below[entry.id] for end in _ends_below(child, below) if end.reason]
+    return ends or [entry]
 
 
 def _why_no_groups(entries: tuple[Entry, ...]) -> str:

@@ -294,22 +294,3 @@ def _whole(part: str, carries: tuple[Carried, ...]) -> MovePlan:
         found.append(replace(carried.carry, first_step=len(steps)))
         steps += carried.steps
     return MovePlan(part, tuple(found), tuple(steps), worst([carried.certificate for carried in carries]))
-
-
-GAVE_WAY = {
-    "grasp group": "nothing works at any of its hand angles",
-    "approach": "neither way round works",
-    "hand": "no pair of arm configurations works",
-}
-
-
-def settle(ledger: Ledger, waiting: set[int]) -> None:
-    """Options below which everything fell have fallen themselves; those in `waiting`, with something untested below, stand."""
-    standing, below = set(waiting), {entry.parent for entry in ledger.entries}
-    for entry in reversed(ledger.entries):
-        if entry.reason is not None or entry.parent is None or entry.stage not in (*GAVE_WAY, "arm"):
-            continue
-        if entry.stage == "arm" or entry.id in standing or entry.id not in below:
-            standing.add(entry.parent)
-        else:
-            ledger.fall(entry.id, GAVE_WAY[entry.stage])

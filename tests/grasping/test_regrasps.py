@@ -121,7 +121,7 @@ def test_a_part_is_turned_over_by_one_regrasp():
 def test_why_there_is_no_sequence_is_told():
     table = grasp_placement_table(LIBRARY.part("brick"), HAND, COARSE)
     never, always = np.full(len(table.angles), np.inf), np.zeros(len(table.angles))
-    assert why_none(table, never, always) == "none of the part's grasps is legal at the start"
+    assert why_none(table, never, always) == "none of the part's grasps is legal and in reach at the start"
     assert next(sequences(table, never, always), None) is None
     ball = Part("crate", box((0.2, 0.3, 0.25)))
     nothing = grasp_placement_table(ball, HAND, COARSE)
