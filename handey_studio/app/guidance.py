@@ -1,11 +1,14 @@
 """What to do next, said in one sentence for every state that the workbench can be in."""
 
+from handey_studio.app import html
 from handey_studio.app.jobs import CANCELLED, FIRST_JOB
 from handey_studio.app.state import Job, State
 from handey_studio.session.run import PLANNED, SENSED
 from handey_studio.task.move import UNSURE
+from handey_studio.task.plan import MoveResult
 
 FIRST = "(The first job after an installation takes a minute or two longer: its code is compiled, once.)"
+UNSEEN = "By the arm's joints the part is where it was to be; no scan sees that place."
 STAGES = (("Sense", 0.0), ("Plan", SENSED), ("Execute", PLANNED))
 
 
@@ -27,7 +30,7 @@ def next_step(state: State) -> tuple[str, str, str]:
     if job is not None:
         what = "Stopping" if job.cancelling else job.title or ("Moving" if job.execute else "Planning")
         first = f" {FIRST}" if job.number == 1 and job.message != FIRST_JOB else ""
-        return f"{what} …", f"{job.message[:1].upper()}{job.message[1:]}{first}", "info"
+        return f"{what} …", f"{html.sentence(job.message)}{first}", "info"
     if not session.workcell.parts:
         return "This workcell has no part models", "Model one of what lies in the cell (Model, on the left), or open a session.", "quiet"
     if state.command is None:
@@ -45,7 +48,15 @@ def next_step(state: State) -> tuple[str, str, str]:
         return "No plan was found", f"{_sentence(result.reason)} {_way_out(result.reason)}", "bad"
     if result.status == "planned":
         return "Planned: look before it moves", "Play or scrub the timeline. MOVE carries it out.", "good"
+    if unseen(result):
+        return "Done, as far as can be told", f"{UNSEEN} Choose where it goes next, or save the session.", "good"
     return "Done", "The part was moved. Choose where it goes next, or save the session.", "good"
+
+
+def unseen(result: MoveResult) -> bool:
+    """Whether no scan afterwards could see where a part was put."""
+    check = result.performance.check if result.performance is not None else None
+    return check is not None and check.found == "hidden"
 
 
 def _way_out(reason: str) -> str:
@@ -59,4 +70,4 @@ def _way_out(reason: str) -> str:
 
 def _sentence(reason: str) -> str:
     """A reason as a sentence of its own."""
-    return f"{reason[:1].upper()}{reason[1:].rstrip('.')}."
+    return f"{html.sentence(reason).rstrip('.')}."

@@ -121,5 +121,10 @@ def figure(svg: str, chips: Iterable[tuple[palette.RGB, str]], words: str) -> st
     return f'<div style="margin:6px 14px;font-size:12px;line-height:1.7">{svg}{legend}</div>'
 
 
+def sentence(text: str) -> str:
+    """Words that begin a sentence of their own."""
+    return text[:1].upper() + text[1:]
+
+
 def millimetres(metres: float, digits: int = 0) -> str:
     return f"{1e3 * metres:.{digits}f} mm"

@@ -6,6 +6,7 @@ import viser
 from handey_studio.app import html, palette
 from handey_studio.app.cspace import slice_html
 from handey_studio.app.exporting import ExportPlan
+from handey_studio.app.guidance import UNSEEN, unseen
 from handey_studio.app.panels.running import HappenedPanel
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, set_to
@@ -74,7 +75,8 @@ def result_html(result: MoveResult) -> str:
     """Status, reason, poses, certificate."""
     tone = {"planned": "info", "done": "good", "failed": "bad"}[result.status]
     title = f"MOVE {result.command.part} TO {result.command.to}"
-    said = {"planned": "Planned, not carried out yet.", "done": "Done."}.get(result.status, result.reason)
+    done = UNSEEN if unseen(result) else "Done."
+    said = {"planned": "Planned, not carried out yet.", "done": done}.get(result.status, html.sentence(result.reason))
     pane = html.card(title, said, tone, "result")
     if result.plan is None:
         return pane

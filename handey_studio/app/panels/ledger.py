@@ -19,6 +19,7 @@ ONLY = ("all", "fell", "stood")
 MAX_REASONS, MAX_DEPTH = 6, 12
 UP, BACK, ON, AWAY = "▲ Up", "◀ Prev", "Next ▶", "Clear"
 PRESSED = {UP: LedgerUp(), BACK: LedgerPage(-1), ON: LedgerPage(1), AWAY: LookAtNoEntry()}
+STOOD = {"step": "done", "recovery": "done"}  # what was carried out was no option any more
 NOTHING = "Nothing was tried yet. After Plan or MOVE this is the tree of every option, and why each branch fell."
 
 
@@ -83,7 +84,8 @@ def _row(entry: Entry, below: tuple[int, int], looked_at: bool, button: str) -> 
     colour, sign = (palette.VERMILLION, "✕") if fell else (palette.TEAL, "●")
     look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if looked_at else "border-left-color:#e3e8ee"
     more = f'<span style="color:#6b7684;white-space:nowrap">{below[0]} ▸</span>' if below[0] else ""
-    said = html.esc(describe(entry) or (f"{below[1]} of {below[0]} below it fell" if below[0] else "nothing speaks against it"))
+    stood = f"{below[1]} of {below[0]} below it fell" if below[0] else STOOD.get(entry.stage, "nothing speaks against it")
+    said = html.esc(describe(entry) or stood)
     return (
         f'<div data-testid="entry-{entry.id}" role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}" '
         f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'

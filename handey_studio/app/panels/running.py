@@ -76,7 +76,7 @@ def _row(row: Happening, count: int, number: int, button: str) -> str:
         f'background:#f7f9fb">'
         f'<div style="display:flex;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span><b style="font-weight:600;flex:1">'
         f'{html.esc(row.title)}</b><span style="color:#6b7684;white-space:nowrap">{when}</span></div>'
-        f'<div style="color:#4a5562;padding-left:18px;font-size:11.5px">{html.esc(row.sentence)}</div></div>'
+        f'<div style="color:#4a5562;padding-left:18px;font-size:11.5px">{html.esc(html.sentence(row.sentence))}</div></div>'
     )
 
 

@@ -94,6 +94,8 @@ def found_html(session: Session) -> str:
     for placed, pose in zip(session.scene.instances, session.scene.located.poses, strict=False):
         places[placed.name] += f"; {100 * pose.visible_fraction:.0f} % seen, {1e3 * pose.surface_rms_m:.2f} mm rms"
         places[placed.name] += f"; {words}" if (words := could_also_be(pose.part, pose.rivals)) else ""
+    for name in places.keys() & set(session.scene.known):
+        places[name] += "; known from before, and the readings agree"
     return html.facts(places.items(), "located")
 
 

@@ -41,7 +41,7 @@ class WristBoxScene:
 
 
 def _shown(state: State) -> bool:
-    replay = state.replay
-    if replay is None or LAYER in state.session.view.hidden_layers:
+    replay, moment = state.replay, state.moment
+    if replay is None or moment is None or moment.held is None or LAYER in state.session.view.hidden_layers:
         return False
     return replay.plan.steps[replay.step_at(state.session.view.time_s)].kind == "transfer"
