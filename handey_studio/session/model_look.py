@@ -119,9 +119,16 @@ def _floor(scan: Scan) -> float:
 
 
 def _beside(scans: Sequence[Scan], poses: Sequence[NDArray], scan: Scan) -> NDArray:
-    """Beside all others along x, so that points can be picked on both."""
-    right = max((float(points_of(other, pose)[:, 0].max()) for other, pose in zip(scans, poses, strict=False)), default=0.0)
-    return frozen_array(transform(None, (right + GAP_M - float(_readings(scan)[:, 0].min()), 0.0, 0.0)))
+    """What it shows stands beside what all others show along x, level with it along y, so that points can be picked on both."""
+    here, there = points_of(scan, np.eye(4)), [points_of(other, pose) for other, pose in zip(scans, poses, strict=False)]
+    there = [points for points in there if len(points)]
+    if not len(here) or not there:
+        return np.eye(4)
+    low, _ = np.percentile(here, (1.0, 99.0), axis=0)
+    ends = [np.percentile(points, (1.0, 99.0), axis=0) for points in there]
+    right = max(float(high[0]) for _, high in ends)
+    across = np.median(there[0][:, 1]) - np.median(here[:, 1])
+    return frozen_array(transform(None, (right + GAP_M - float(low[0]), float(across), 0.0)))
 
 
 @lru_cache(maxsize=16)

@@ -47,6 +47,7 @@ def visit(chromium) -> Iterator:
 
     def arrive(workbench: Workbench, ready: str = "MOVE", viewport: dict[str, int] = SMALL) -> Page:
         page = chromium.new_context(viewport=viewport, accept_downloads=True).new_page()
+        page.set_default_timeout(60_000)  # software rendering on a busy machine
         pages.append(page)
         page.goto(address(workbench))
         page.get_by_role("button", name=ready, exact=True).wait_for(timeout=60_000)

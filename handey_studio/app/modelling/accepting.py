@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from handey_studio.app.actions import Bench, CancelMove
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.importing import LeaveMesh
-from handey_studio.app.modelling.look import SELECT
+from handey_studio.app.modelling.look import POINTS, SELECT
 from handey_studio.app.modelling.steps import AcceptAlignment, TakeModel
-from handey_studio.app.modelling.tool_clicks import CUT, EXTRUDE, MIRROR, POINTS, SKETCH
-from handey_studio.app.modelling.tools import FINISHED, ChooseTool, FinishTool
+from handey_studio.app.modelling.tool_clicks import CUT, EXTRUDE, MIRROR, SKETCH, with_tool
+from handey_studio.app.modelling.tools import FINISHED, FinishTool
 from handey_studio.app.state import State
 from handey_studio.session.model_look import proposals
 
@@ -48,7 +48,7 @@ class Escape:
             return replace(state, model=replace(state.model, trial=None))
         if state.model.clicks or state.model.drawing is not None:
             return replace(state, model=replace(state.model, clicks=(), drawing=None))
-        return ChooseTool(SELECT).apply(replace(state, model=replace(state.model, step=None, check=-1)))
+        return with_tool(replace(state, model=replace(state.model, step=None, check=-1)))
 
 
 def accept_label(state: State) -> str:

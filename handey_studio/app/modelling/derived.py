@@ -4,7 +4,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from handey_studio.app.modelling.look import Worked
+from handey_studio.app.modelling.look import POINTS, Worked
 from handey_studio.app.state import State, same
 from handey_studio.localization import LocateResult
 from handey_studio.modeling.draft import Draft
@@ -149,9 +149,10 @@ def tried(state: State) -> LocateResult | None:
 
 
 def scan_poses(state: State) -> tuple[NDArray, ...]:
-    """Where each scan is shown, T_model_scan (4, 4)."""
+    """Where each scan is shown, T_model_scan (4, 4); while points are picked, one that is not aligned yet stands beside the others."""
     draft = draft_of(state)
-    return shown_poses(draft, alignment(state), state.model.alternative) if draft is not None else ()
+    proposed = None if state.model.tool == POINTS else alignment(state)
+    return shown_poses(draft, proposed, state.model.alternative) if draft is not None else ()
 
 
 def scene_to_click(state: State) -> Pickable | None:

@@ -1,9 +1,9 @@
 """What to do next with the model, said in one sentence for every state that it can be in; and what the active tool waits for."""
 
 from handey_studio.app.modelling import derived
-from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE, MeshImport
+from handey_studio.app.modelling.look import BY_HEIGHT, POINTS, SELECT, TO_FACE, MeshImport
 from handey_studio.app.modelling.plane_tools import measurement, tool_plane
-from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH
+from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, SKETCH
 from handey_studio.app.state import State
 from handey_studio.base import measured
 from handey_studio.modeling.scans import Scan

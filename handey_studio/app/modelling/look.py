@@ -15,7 +15,7 @@ from handey_studio.modeling.snap import Snap
 from handey_studio.session.mesh_files import MeshUpload
 from handey_studio.session.model_files import Upload
 
-SELECT = "select"
+SELECT, POINTS = "select", "align"
 TO_TABLE, BY_HEIGHT, TO_FACE = "to the table", "by a height", "to a face"
 BY_SCAN, BY_DISTANCE = "scan", "distance"
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from handey_studio.app.modelling import derived
 from handey_studio.app.state import State
 from handey_studio.modeling.patches import Patches
+from handey_studio.session.model_look import points_of
 
 AWAY = np.array([0.42, -0.80, 0.72])  # from the front, the side and above
 DISTANCES = 2.7  # extents of an object from which one looks at it
@@ -55,6 +56,15 @@ def look_at_object(bench: Any, found: Patches) -> None:
     rings = [ring for number in found.objects[0] for ring in found.patches[number].rings] if found.objects else []
     if rings:
         look_at(bench, np.concatenate([*rings, *(ring * (1.0, 1.0, 0.0) for ring in rings)]), None)
+
+
+def look_at_scans(bench: Any, state: State) -> None:
+    """Cameras go to where they see what all scans show above their supports, where these stand in a state."""
+    draft = derived.draft_of(state)
+    seen = [points_of(scan, pose) for scan, pose in zip(draft.scans, derived.scan_poses(state), strict=True)] if draft is not None else []
+    seen = [points for points in seen if len(points)]
+    if seen:
+        look_at(bench, np.concatenate([np.percentile(points, (1.0, 99.0), axis=0) for points in seen]), None)
 
 
 def look_at(bench: Any, points: NDArray, client: int | None) -> None:

@@ -9,7 +9,7 @@ from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.modeling.snap import Snap
 
-BOX, SKETCH, EXTRUDE, CUT, MIRROR, MEASURE, POINTS = "box", "sketch", "extrude", "cut", "mirror", "measure", "align"
+BOX, SKETCH, EXTRUDE, CUT, MIRROR, MEASURE = "box", "sketch", "extrude", "cut", "mirror", "measure"
 SAME_M = 5e-4  # clicks nearer than this are one
 
 

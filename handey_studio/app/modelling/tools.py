@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from handey_studio.app.modelling.derived import built, draft_of, scene_to_click, wants_suggestion
 from handey_studio.app.modelling.drawing_tools import box_clicked, close_sketch, drawn, extrude, extrude_clicked, sketch_clicked
-from handey_studio.app.modelling.look import SELECT
+from handey_studio.app.modelling.look import POINTS, SELECT
 from handey_studio.app.modelling.plane_tools import cut, measure_clicked, mirrored, plane_clicked
 from handey_studio.app.modelling.selecting import aligned_by_points, points_clicked, selected
-from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH, with_tool
+from handey_studio.app.modelling.showing import look_at_scans
+from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, SKETCH, with_tool
 from handey_studio.app.state import State
 from handey_studio.modeling.snap import Ray, Snap, SnapOptions
 from handey_studio.modeling.snapping import pick
@@ -37,12 +39,15 @@ class ClickScene:
 
 @dataclass(frozen=True)
 class ChooseTool:
-    """Another tool, with nothing clicked yet."""
+    """Another tool, with nothing clicked yet. To pick points on two scans, every camera goes where it sees both."""
 
     tool: str
 
-    def apply(self, state: State) -> State:
-        return with_tool(state, self.tool)
+    def run(self, bench: Any) -> State:
+        state = with_tool(bench.state, self.tool)
+        if self.tool == POINTS:
+            look_at_scans(bench, state)
+        return state
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.accepting import Accept, accept_label
 from handey_studio.app.modelling.guidance import model_step
 from handey_studio.app.modelling.importing import UploadMesh
-from handey_studio.app.modelling.look import BY_HEIGHT, SELECT, TO_FACE, TO_TABLE
+from handey_studio.app.modelling.look import BY_HEIGHT, POINTS, SELECT, TO_FACE, TO_TABLE
 from handey_studio.app.modelling.scanning import SCAN_CELL, TURN_OVER, CloseModel, NewModel, OpenModel, SetUnit, StartExample, UploadScan
 from handey_studio.app.modelling.steps import ConfirmPicked, OtherAlignment
-from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MIRROR, POINTS, SKETCH
+from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MIRROR, SKETCH
 from handey_studio.app.modelling.tools import ChooseTool, SetTool
 from handey_studio.app.modelling.typed import Typed, typed_options
 from handey_studio.app.panels.mesh import MeshPanel
@@ -142,7 +142,7 @@ class ModelPanel:
         set_to(self._next, content=html.card(*model_step(new), testid="model-next"))
         label = accept_label(new)
         set_to(self._accept, visible=bool(label), label=label or "Accept")
-        set_to(self._other, visible=len(proposals(derived.alignment(new))) > 1)
+        set_to(self._other, visible=look.tool != POINTS and len(proposals(derived.alignment(new))) > 1)
         set_to(self._cancel, visible=new.job is not None)
         bar = toolbar(look.tool, _usable(new), element_id(self._tool)) if draft is not None else ""
         set_to(self._tools, content=html.unseen([element_id(self._tool)]) + bar)

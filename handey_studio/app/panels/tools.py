@@ -1,8 +1,8 @@
 """The modeller's tools as a row of chips; the active one is filled."""
 
 from handey_studio.app import html, palette
-from handey_studio.app.modelling.look import SELECT
-from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, POINTS, SKETCH
+from handey_studio.app.modelling.look import POINTS, SELECT
+from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, SKETCH
 from handey_studio.app.palette import css
 
 TOOLS = (SELECT, BOX, SKETCH, EXTRUDE, CUT, MIRROR, MEASURE, POINTS)

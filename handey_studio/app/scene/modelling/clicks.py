@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from handey_studio.app import palette
 from handey_studio.app.modelling import derived
-from handey_studio.app.modelling.look import Drawing
+from handey_studio.app.modelling.look import POINTS, Drawing
 from handey_studio.app.modelling.plane_tools import measurement, tool_plane
 from handey_studio.app.modelling.tool_clicks import CUT, MIRROR
 from handey_studio.app.modelling.tools import ClickScene
@@ -42,16 +42,16 @@ class ClickScenes:
             return
         self._scene.add_frame(ROOT, show_axes=False)
         for number, snap in enumerate((*new.model.picked, *new.model.clicks)):
-            self._add_snap(f"{ROOT}/snap{number}", snap, new)
+            self._add_snap(f"{ROOT}/snap{number}", snap, new, f"{number // 2 + 1}" if new.model.tool == POINTS else snap.of)
         if new.model.drawing is not None:
             self._add_drawing(new.model.drawing)
         self._add_sketches(new)
         self._add_plane(new)
         self._add_measure(new)
 
-    def _add_snap(self, name: str, snap: Snap, state: State) -> None:
+    def _add_snap(self, name: str, snap: Snap, state: State, words: str) -> None:
         self._dot(name, snap.point)
-        self._label(f"{name}_label", snap.point, snap.of)
+        self._label(f"{name}_label", snap.point, words)
         shown = derived.built(state)
         if snap.owner != MODEL or shown is None or shown.solid is None:
             return
