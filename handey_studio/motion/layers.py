@@ -36,6 +36,11 @@ class Layers(Value):
         """Cells (layers, n1, n2, n3)."""
         return np.stack([space.blocked for space in self.spaces])
 
+    @property
+    def places(self) -> NDArray:
+        """Where (k, 3) [rad] the arm joints are free in all layers: the centres of the cells."""
+        return self.spaces[0].centre(np.argwhere(~self.blocked.any(axis=0)))
+
     @cached_property
     def regions(self) -> Regions:
         """The free regions of all layers together."""

@@ -101,26 +101,29 @@ def _attempts(asked: Query, rng: np.random.Generator, progress: Progress) -> Ite
     ways = wrist_ways(asked, rng, 2)
     if not ways:
         yield Attempt("wrist", _nothing(asked), [], None, "the wrist finds no way to turn that keeps the hand off the arm")
-    steps, growths = asked.options.steps_deg, asked.options.tree_growths
+    steps, growths, places = asked.options.steps_deg, asked.options.tree_growths, None
     for k, step in enumerate(steps):
         for needed, layers in _plans(asked, ways, step):
             progress.report(k / (len(steps) + 1), f"configuration space of the arm joints, {step:g}° cells")
-            found = three_legs(asked, layers(), rng, progress)
+            stack = layers()
+            places = stack.places if stack.assumed is not None else places
+            found = three_legs(asked, stack, rng, progress)
             needed = ", ".join(word for word in (needed, found.more) if word)
             yield Attempt(needed, found.points, found.movers, found.space, found.reason, bodies=found.bodies)
             if found.shut:
                 break
         if k == 0 and growths:
-            yield _trees(asked, min(FEW_GROWTHS, growths), rng, progress)
+            yield _trees(asked, min(FEW_GROWTHS, growths), places, rng, progress)
             if surely_apart(asked):
                 why = "start and goal stay apart even where only what is wholly blocked is taken out"
                 yield Attempt("proof", _nothing(asked), [], None, why, proven=True)
     if growths > FEW_GROWTHS:
-        yield _trees(asked, growths, rng, progress)
+        yield _trees(asked, growths, places, rng, progress)
 
 
-def _trees(asked: Query, most: int, rng: np.random.Generator, progress: Progress) -> Attempt:
-    points, movers, grown = grow_trees(asked, most, rng, progress)
+def _trees(asked: Query, most: int, places: NDArray | None, rng: np.random.Generator, progress: Progress) -> Attempt:
+    """Random trees that grow towards the places where the arm is free with the wrist as it is at either end."""
+    points, movers, grown = grow_trees(asked, most, rng, progress, places)
     why = "" if len(points) else "the random trees did not meet"
     return Attempt(f"random trees, {grown} growths", points, movers, None, why)
 

@@ -53,9 +53,12 @@ class Tree:
         return self.count - 1
 
 
-def grow_trees(query: Query, most: int, rng: np.random.Generator, progress: Progress) -> tuple[NDArray, list[Mover], int]:
+def grow_trees(
+    query: Query, most: int, rng: np.random.Generator, progress: Progress, places: NDArray | None = None
+) -> tuple[NDArray, list[Mover], int]:
     """Points (n, joints) of a path and the mover of each segment, both empty when the trees did not meet in `most`
-    growths; and how often they grew.
+    growths; and how often they grew. They grow towards postures near their roots and, where `places` (k, 3) [rad] of the arm joints are
+    given, towards these with the wrist in any posture; else towards any at all.
     """
     trees = Tree(query.start, query.leaving, query.free), Tree(query.goal, query.arriving, query.free)
     lower, upper = _bounds(query)
@@ -64,7 +67,7 @@ def grow_trees(query: Query, most: int, rng: np.random.Generator, progress: Prog
             progress.report(growth / most, f"random trees: {growth} growths, {trees[0].count + trees[1].count} postures")
             if progress.cancelled:
                 break
-            targets = _drawn(query, lower, upper, rng)
+            targets = _drawn(query, lower, upper, rng, places)
         met = _grow(trees, growth % 2, targets[growth % AT_ONCE])
         if met is not None:
             ways = [tree.branch(node) for tree, node in zip(trees, met, strict=True)]
@@ -90,9 +93,13 @@ def _grow(trees: tuple[Tree, Tree], turn: int, target: NDArray) -> tuple[int, in
     return None
 
 
-def _drawn(query: Query, lower: NDArray, upper: NDArray, rng: np.random.Generator) -> NDArray:
-    """Postures (AT_ONCE, n) to grow towards: for start tree and goal tree in turn, two anywhere and two near the tree's root."""
+def _drawn(query: Query, lower: NDArray, upper: NDArray, rng: np.random.Generator, places: NDArray | None) -> NDArray:
+    """Postures (AT_ONCE, n) to grow towards: for start tree and goal tree in turn, two anywhere, or at one of the places if there are
+    any, and two near the tree's root.
+    """
     anywhere = rng.uniform(lower, upper, (AT_ONCE, len(lower)))
+    if places is not None and len(places):
+        anywhere[:, query.world.robot.arm_index] = places[rng.integers(len(places), size=AT_ONCE)]
     roots = np.where((np.arange(AT_ONCE) % 2 == 0)[:, None], query.start, query.goal)
     near = np.clip(roots + rng.uniform(-NEAR_RAD, NEAR_RAD, anywhere.shape), lower, upper)
     return np.where((np.arange(AT_ONCE) % 4 < 2)[:, None], anywhere, near)

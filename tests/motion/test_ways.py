@@ -51,6 +51,7 @@ def test_where_the_wrist_turns_both_ends_have_room(asked, way):
         assert not ends[tuple(around)].any()
     crowded = np.argwhere(assumed & ~ends)
     assert len(crowded) and layers.assumed == 1
+    assert len(layers.places) == (~assumed).sum()
 
 
 def test_a_place_that_does_not_serve_is_left_for_another(asked, way):
@@ -86,8 +87,10 @@ def test_deep_in_a_bin_more_legs_lead_out():
     assert Judge(problem.world, problem.opening, problem.held).first_meeting(found.points, 0.02) is None
 
 
-def test_trees_keep_the_legs_at_their_roots_to_those_who_speak_for_them(asked):
-    points, movers, grown = grow_trees(asked, 2000, np.random.default_rng(0), Silent())
+@pytest.mark.parametrize("seeded", [False, True])
+def test_trees_keep_the_legs_at_their_roots_to_those_who_speak_for_them(asked, way, seeded):
+    places = turned_at_one_place(asked, way, STEP).places if seeded else None
+    points, movers, grown = grow_trees(asked, 2000, np.random.default_rng(0), Silent(), places)
     assert 0 < grown <= 2000 and (points[0] == asked.start).all() and (points[-1] == asked.goal).all()
     assert len(movers) == len(points) - 1 and movers[0] is asked.leaving and movers[-1] is asked.arriving
     assert Judge(asked.world, OPENING).first_meeting(points, 0.02) is None
