@@ -34,7 +34,7 @@ def outcome_of(state: State, result: MoveResult) -> Outcome:
     seen = None if check is None or check.off_m is None or check.off_rad is None else (check.off_m, check.off_rad)
     noticed = sum(len(performance.incidents) for performance in result.performances)
     said = f"{result.command.part} → {result.command.to}"
-    off = truly_off(state.session, result) if result.performances else None
+    off = truly_off(state.session, result) if result.status == "done" else None
     return Outcome(is_misplaced(state), said, result.status, result.reason, len(result.performances), noticed, seen, off)
 
 

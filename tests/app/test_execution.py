@@ -383,11 +383,11 @@ def test_moves_before_and_after_a_calibration_stand_side_by_side(done):
     state = replace(done, session=replace(session, cell_now=replace(session.workcell.setup, bodies=(really,))))
     state = with_outcome(state)
     said = off_words(state.outcomes[0].truly_off)
-    assert (state.outcomes[0].status, state.outcomes[0].attempts) == ("done", 2) and said.startswith("5.0 mm, 0.0°")
+    assert (state.outcomes[0].status, state.outcomes[0].attempts) == ("done", 2) and said == "5.0 mm 0.0°"
     state = with_outcome(Misplace(True).apply(state))
     assert len(state.outcomes) == 1 and not state.outcomes[0].misplaced, "what was found before went"
     shown = outcomes_html((*state.outcomes, replace(state.outcomes[0], misplaced=True, status="failed", reason="<b>slipped</b>")))
-    assert shown.index("misplaced") < shown.index("in place") and "&lt;b&gt;slipped" in shown and "0.4 mm, 0.1°" in shown
+    assert shown.index("misplaced") < shown.index("in place") and "&lt;b&gt;slipped" in shown and "0.4 mm 0.1°" in shown
 
 
 def test_what_goes_when_the_range_finder_is_moved_is_said(done, state):

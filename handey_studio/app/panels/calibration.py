@@ -74,10 +74,10 @@ def outcomes_html(outcomes: Sequence[Outcome]) -> str:
     """The MOVEs of this session side by side: a row each, the last one first."""
     if not outcomes:
         return ""
-    head = _row(("range finder", "MOVE", "tries", "noticed", "seen off", "truly off"), "color:#6b7684")
+    head = _row(("finder", "MOVE", "tries", "noticed", "seen off", "truly off"), "color:#6b7684")
     rows = "".join(_row(_words(one)) + _why(one) for one in reversed(outcomes))
     note = "Off its command, as the scan afterwards saw it, and truly: known only because the cell is simulated."
-    style = "margin:2px 14px 6px;font-size:11.5px;line-height:1.35;font-variant-numeric:tabular-nums"
+    style = "margin:2px 14px 6px;font-size:11px;line-height:1.35;font-variant-numeric:tabular-nums"
     table = f'<table>{head}{rows}</table><div style="color:#6b7684">{note}</div>'
     return f'{html.heading("MOVEs before and after")}<div data-testid="outcomes" style="{style}">{table}</div>'
 
@@ -92,13 +92,13 @@ def _why(one: Outcome) -> str:
 
 
 def _row(words: Sequence[str], look: str = "") -> str:
-    cells = "".join(f'<td style="padding:1px 7px 1px 0;vertical-align:top;{look}">{html.esc(word)}</td>' for word in words)
+    cells = "".join(f'<td style="padding:1px 6px 1px 0;white-space:nowrap;{look}">{html.esc(word)}</td>' for word in words)
     return f"<tr>{cells}</tr>"
 
 
 def off_words(off: tuple[float, float] | None) -> str:
     """A distance and an angle."""
-    return "–" if off is None else f"{1e3 * off[0]:.1f} mm, {np.rad2deg(off[1]):.1f}°"
+    return "–" if off is None else f"{1e3 * off[0]:.1f} mm {np.rad2deg(off[1]):.1f}°"
 
 
 def residuals_svg(fit: FrameFit) -> str:
