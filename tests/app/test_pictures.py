@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from handey_studio.app import html
 from handey_studio.app.cspace import nearest, slice_svg
@@ -14,6 +15,7 @@ from handey_studio.app.panels.grasp import grasp_facts
 from handey_studio.app.panels.ledger import context, entry_html, ledger_html
 from handey_studio.app.panels.sensing import counted, found_html, picked, word_of
 from handey_studio.app.panels.timeline import strip
+from handey_studio.app.scene.cspace import FACING, slice_picture
 from handey_studio.app.scene.depth import elevation_span, stride_of, thinned
 from handey_studio.app.state import State, opened, with_view
 from handey_studio.app.svg_plane import grasp_plane_svg
@@ -163,3 +165,12 @@ def test_readings_on_a_located_part_leave_the_map_with_it(session):
     assert not left[inside].any() and inside.sum() > 20
     far = np.hypot(*(world - T_START[:2, 3]).T).reshape(elevation.shape) > 0.12
     assert left[far & np.isfinite(elevation)].all()
+
+
+def test_the_slice_in_the_scene_is_tinted_where_it_is_forbidden_and_stands_along_its_joints():
+    blocked = np.zeros((5, 3), dtype=bool)
+    blocked[4, 0] = True  # the second joint at its highest, the third at its lowest
+    picture = slice_picture(blocked)
+    assert picture.shape == (3, 5, 4) and np.argwhere(picture[:, :, 3]).tolist() == [[2, 4]]
+    right, down = Rotation.from_quat(FACING, scalar_first=True).apply(np.eye(3)[:2])
+    np.testing.assert_allclose((right, down), ((0, 1, 0), (0, 0, -1)), atol=1e-12)

@@ -11,9 +11,10 @@ from handey_studio.app.actions import CancelMove
 from handey_studio.app.calibrating import MISPLACED_HINT, AcceptCalibration, DiscardCalibration, Misplace, StartCalibration
 from handey_studio.app.compared import is_misplaced
 from handey_studio.app.outcome import Outcome
+from handey_studio.app.page_style import in_a_row
 from handey_studio.app.palette import css
 from handey_studio.app.state import State
-from handey_studio.app.wire import Send, on_click, on_user, set_to
+from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.sensing.frame_fit import FitOptions, FrameFit
 from handey_studio.task.calibrate import RangeCalibration
 from handey_studio.task.calibration_report import calibration_lines
@@ -34,6 +35,7 @@ class CalibrationPanel:
         self._cancel = gui.add_button("Cancel the calibration", icon=viser.Icon.PLAYER_STOP, color=palette.VERMILLION, visible=False)
         self._accept = gui.add_button("Accept", icon=viser.Icon.CHECK, color=palette.BLUE, visible=False)
         self._discard = gui.add_button("Discard", color="gray", visible=False)
+        gui.add_html(in_a_row([element_id(self._accept), element_id(self._discard)]))
         self._found = gui.add_html("")
         self._outcomes = gui.add_html("")
         on_user(self._misplaced, send, lambda event: Misplace(bool(event.target.value)))
