@@ -40,9 +40,11 @@ def test_the_python_example_moves_the_block(capsys):
     assert told.strip().splitlines()[-1].startswith("[") or "]]" in told, "the pose that was reached"
 
 
-def test_the_modelling_example_builds_a_carton(capsys):
+def test_the_modelling_example_builds_a_carton_whose_draft_is_replayed(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     exec(compile("\n".join(code("A part is its history", MODELLING)), "modelling.md", "exec"), {})
     assert capsys.readouterr().out.startswith("(0.00139"), "180 × 119.5 × 65 mm"
+    assert cli.main(["model", "replay", "carton.draft"]) == 0
 
 
 def test_readme_links_to_every_page_of_the_guide_and_to_nothing_that_is_not_there():

@@ -47,7 +47,11 @@ class Surface(Value):
 
 
 def surface_of(view: DepthView) -> Surface:
-    """Normals by least squares in a window that leaves out what lies across a jump."""
+    """The surface that a view shows: at each reading a normal and the slopes of depth, by least squares in a window around it.
+
+    The window is as small as a normal's error of `MAX_NORMAL_ERROR` allows, and leaves out what lies across a jump; NaN where fewer than
+    `MIN_SAMPLES` readings are left, or the surface is steeper than `MAX_SLOPE`.
+    """
     typical = _typical(view.depth)
     pixel = float(1.0 / view.projection.pixels_per_metre(typical))
     radius = window_radius(view.noise, pixel)

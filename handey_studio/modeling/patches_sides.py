@@ -30,9 +30,12 @@ NAMES = {"r": "rim", "k": "cut", "i": "image"}
 
 
 class Seen(NamedTuple):
-    """What outlines are made from: the view, `labels` (H, W) with -2 for the support, world planes (n, 4) as normal and offset, readings'
-    `sigma` (H, W) [m], how far the true outline may lie outside the outermost readings, `lost_m`, and how much rims drift [px]: by how
-    much several pixels together lie farther in or out than a straight line."""
+    """What outlines are made from.
+
+    `view`; `labels` (H, W), each reading's patch, -2 for the support and -1 for none; `planes` (n, 4) of the patches in the view's world,
+    unit normal and offset [m]; `sigma` (H, W) [m], one reading's noise. `lost_m` [m], at most: how far the true outline lies outside the
+    middles of the outermost readings, see `lost_at_rims`. `drift_px`: how far several pixels of a rim together wander from a straight line.
+    """
 
     view: DepthView
     labels: NDArray
@@ -62,7 +65,11 @@ def lost_at_rims(view: DepthView) -> float:
 
 
 def beyond_of(seen: Seen, number: int, contour: NDArray) -> tuple[NDArray, NDArray]:
-    """What lies beyond each contour pixel: kinds "r", "c", "f", "k" (cut), "i" as characters, and the other patch's number or -1."""
+    """What lies up to `FAR_PX` beyond each contour pixel (n, 2), u and v, of patch `number`: a kind (n,), and a patch (n,) or -1.
+
+    Kinds are letters: "c" a patch that goes on at this depth (a crease), "f" the support at this depth (a foot), "u" readings of no patch
+    at this depth, "r" something farther (a rim), "k" something nearer (a cut), "i" no reading at all, or the image's edge.
+    """
     height, width = seen.labels.shape
     ahead = np.roll(contour, -3, axis=0) - np.roll(contour, 3, axis=0)
     outward = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
