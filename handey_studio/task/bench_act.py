@@ -16,6 +16,7 @@ from handey_studio.cell.piles import Pile
 from handey_studio.cell.simulated import simulated_cell
 from handey_studio.cell.solvable import solvable_move
 from handey_studio.task.bench_faults import Injected, faults_of
+from handey_studio.task.bench_judge import past_recovery
 from handey_studio.task.bench_moves import PARTS, off_truth
 from handey_studio.task.looking import PlaceLimits
 from handey_studio.task.move import MoveOptions
@@ -61,7 +62,7 @@ def bench_act_faults(seeds: Iterable[int], tell: Tell, trial: Trial, jobs: int =
     for kind, counts in summary.items():
         tell(
             f"{kind}: {counts['noticed']} of {counts['mattered']} that mattered noticed, {counts['recovered']} of {counts['recoverable']} "
-            f'put right, {counts["wrong_done"]} wrong "done"'
+            f'put right where that was possible, {counts["wrong_done"]} wrong "done"'
         )
     return {"schema": "handey/bench/act/1", "robot": trial.robot, "rows": rows, "summary": summary}
 
@@ -92,8 +93,9 @@ def _spoilt(trial: Trial, seed: int) -> Rows | str:
 
 
 def _faulty(seed: int, pile: Pile, trial: Trial, injected: Injected) -> dict[str, Any]:
-    row = {"fault": injected.kind, "recoverable": injected.recoverable} | _row(seed, pile, trial, injected.faults)
-    return row | {"noticed": bool(row["incidents"]) or row["status"] != "done"}
+    row = {"fault": injected.kind} | _row(seed, pile, trial, injected.faults)
+    past = "the arm stays jammed" if not injected.recoverable else row["past"]
+    return row | {"noticed": bool(row["incidents"]) or row["status"] != "done", "recoverable": not past, "past": past}
 
 
 def _pile(trial: Trial, seed: int) -> Pile | str:
@@ -147,6 +149,7 @@ def _row(seed: int, pile: Pile, trial: Trial, faults: tuple[Fault, ...]) -> dict
         "check": result.check.found if result.check else None,
         "check_off_mm": 1e3 * result.check.off_m if result.check and result.check.off_m is not None else None,
         "touched": unplanned(cell, pile.part),
+        "past": past_recovery(station, cell, result.command, seed) if faults and result.status != "done" else "",
         "cell_s": sum(performance.seconds for performance in result.performances),
         "plan_s": sum(seconds for stage, seconds in result.timing_s.items() if stage not in CELL_STAGES),
         "wall_s": wall_s,
@@ -167,11 +170,12 @@ def _worst_tracking(result: MoveResult) -> float:
 
 def _line(row: dict[str, Any]) -> str:
     fault = f"{row['fault']:16} " if "fault" in row else ""
+    past = f"; past recovery: {row['past'][:140]}" if row["past"] else ""
     touched = "".join(f"; {pair} met with {force:.1f} N" for pair, force in row["touched"].items()) if not fault else ""
     return (
         f"{fault}{row['seed']:4d} {row['part']:10} {row['status']:8} {row['attempts']:5d} {row['off_mm']:7.2f} {row['off_deg']:6.2f} "
         f"{row['cell_s']:7.1f} {row['wall_s']:7.1f} {row['check'] or '-':8} {', '.join(row['incidents']) or 'none'}; {row['reason'][:140]}"
-        f"{touched}"
+        f"{touched}{past}"
     )
 
 

@@ -97,6 +97,17 @@ def fingers_went(moved: Moved, opening: float, hand: Hand, step: int) -> Inciden
     return Incident("hand stuck", step, "the fingers stay away from where they were sent by", off, FINGER_M, "m")
 
 
+def gave_way(now: Hold, before: Hold | None, physics: bool, step: int) -> Incident | None:
+    """After a descent that felt no touch: whether the support bears the part all the same, `before` being how it was held on the way.
+    Fingers that hold it loosely let it be pushed up in them by less force than a touch is told by."""
+    if not physics or before is None or before.weight <= LEAST_WEIGHT_N or now.weight >= LOST_WEIGHT * before.weight:
+        return None
+    return Incident(
+        "slipped", step, "the part stands on its support and was pushed up in the fingers; the wrist bears",
+        now.weight, LOST_WEIGHT * before.weight, "N", overcome=True,
+    )  # fmt: skip
+
+
 def came_down(height: float, contact: bool, step: int) -> Incident | None:
     """After the guarded descent, `height` [m] of the part above where it was commanded."""
     if contact and height > EARLY_M:

@@ -16,6 +16,7 @@ from handey_studio.task.noticing import (
     came_down,
     closed_on,
     fingers_went,
+    gave_way,
     hold_of,
     lifted,
     not_arrived,
@@ -102,22 +103,32 @@ class Performer:
 
     def _lost(self, number: int, carry: Carry) -> Incident | None:
         """Whether the part that is carried left the fingers or moved in them; after the lift it is felt for the first time."""
-        now = hold_of(self.cell, self.task.held(carry), self.acting.hand_now())
+        now = self._hold_now(self.task.held(carry))
         before, self._hold = self._hold or lifted(now, carry.grasp.width, self.task.carried.robot.hand), now
         lost = still_held(now, before, closing(carry), self.cell.physics, number)
         self.holding = lost is None or lost.kind != "dropped"
         return lost
 
     def _place(self, number: int, step: Step, carry: Carry) -> Incident | None:
-        """Descend until contact, a little beyond the commanded pose if need be, then let the part come to rest on its support."""
+        """Descend until contact, a little beyond the commanded pose if need be, then let the part come to rest on its support.
+
+        Where it rests there already, pushed up in fingers that hold it loosely, it is not pressed down: the check tells where it stands.
+        """
         held = self.task.held(carry)
         moved = self.acting.descend(number, "place", motion_of(step, GUARDED_SLOWER))
         if moved.ended == "arrived":
             moved = self._deeper(number, step, carry, held) or moved
+        gone = gave_way(self._hold_now(held), self._hold, self.cell.physics, number) if moved.ended == "arrived" else None
+        if gone is not None:
+            self.incidents.append(gone)
+            return None
         incident = not_arrived(moved, step.q_rad[-1], number, step.kind) or came_down(self._height(carry, held), moved.contact, number)
         if incident is None:
             self.acting.settle(number)
         return incident
+
+    def _hold_now(self, held: Held) -> Hold:
+        return hold_of(self.cell, held, self.acting.hand_now())
 
     def _deeper(self, number: int, step: Step, carry: Carry, held: Held) -> Moved | None:
         """The descent goes on below the commanded pose; None where there is no straight way."""

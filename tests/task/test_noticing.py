@@ -14,7 +14,7 @@ from handey_studio.geometry.transforms import from_xyz_rpy, inverse, pose_differ
 from handey_studio.localization import LocatedPose, LocateResult, Rival
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.task.looking import PlaceLimits, changed, check_place, readings_of, wrong_place
-from handey_studio.task.noticing import Hold, came_down, closed_on, fingers_went, still_held
+from handey_studio.task.noticing import Hold, came_down, closed_on, fingers_went, gave_way, still_held
 from handey_studio.task.performance import thinned
 from handey_studio.task.recover import felt_block
 from handey_studio.task.ruled_out import TURNED, RuledOut, grasp_ruled_out, place_ruled_out, way_ruled_out
@@ -101,6 +101,15 @@ def test_descents_and_fingers_are_told_with_their_number():
     assert fingers_went(Moved("arrived", recording(opening=0.0501)), 0.050, ROBOT.hand, 0) is None
     stuck = fingers_went(Moved("contact", recording(opening=0.040)), 0.050, ROBOT.hand, 0)
     assert stuck is not None and stuck.kind == "hand stuck" and stuck.value == pytest.approx(0.010)
+
+
+def test_a_part_that_its_support_bears_without_a_touch_slipped_in_the_fingers():
+    borne = replace(GRIPPED, weight=0.1)
+    told = gave_way(borne, GRIPPED, True, 6)
+    assert told is not None and told.kind == "slipped" and told.overcome and "0.1 N, limit 0.41 N" in str(told)
+    assert gave_way(replace(GRIPPED, weight=0.8), GRIPPED, True, 6) is None, "it hangs in the fingers: there is nothing below"
+    assert gave_way(borne, GRIPPED, False, 6) is None and gave_way(borne, None, True, 6) is None
+    assert gave_way(replace(borne, weight=0.0), replace(GRIPPED, weight=0.4), True, 6) is None, "too light to be weighed"
 
 
 def test_two_scans_of_the_same_scene_do_not_differ_and_a_moved_part_shows():
