@@ -94,7 +94,7 @@ def with_faults(seen: Seen, faults: SensorFaults, rng: np.random.Generator) -> N
     beside = beside_jumps(seen, faults.jump_m)
     chance, between = rng.random(depth.shape), rng.random(depth.shape)
     mixed = beside & (chance >= faults.jump_lost) & (chance < faults.jump_lost + faults.jump_mixed)
-    depth[mixed] = (near + between * (far - near))[mixed]
+    depth[mixed] = near[mixed] + between[mixed] * (far[mixed] - near[mixed])
     depth += faults.noise_m * _field(depth.shape, faults.shared_px, rng)
     if faults.warp_m > 0:
         depth += faults.warp_m * _field(depth.shape, depth.shape[1] / 10, rng)
