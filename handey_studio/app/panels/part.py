@@ -62,7 +62,7 @@ class PartPanel:
             self._trial = gui.add_upload_button(
                 "Find it in a scan", icon=viser.Icon.UPLOAD, color="gray", mime_type=".png,.json,.npy,.ply,.pcd"
             )
-            with gui.add_folder("Material, replacing", expand_by_default=False):
+            with gui.add_folder("Density, friction, overwrite", expand_by_default=False):
                 self._density: Any = gui.add_number("Density (kg/m³)", 700.0, min=1.0, max=25_000.0, step=10.0)
                 self._friction: Any = gui.add_number("Friction", 0.5, min=0.01, max=2.0, step=0.05)
                 self._replace = gui.add_checkbox("Overwrite one of that name", False)
