@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.base.compiled import put
 from handey_studio.localization.flanks import Run, Seen, flank, space_normal, space_point, w_of, w_sigma
 from handey_studio.localization.runs import (
     MIN_PIXELS,
@@ -58,18 +59,18 @@ def _line(
 ) -> tuple[NDArray, NDArray, NDArray, float]:
     """Ends (2, 3), normals and inward directions (2, 3) of a line at c = 0 and w = level, and how many metres a pixel of it is."""
     ends = np.empty((2, 3))
-    ends[0] = space_point(run, -run.half, 0.0, level[0] - run.half * level[1], camera)
-    ends[1] = space_point(run, run.half, 0.0, level[0] + run.half * level[1], camera)
+    put(space_point(run, -run.half, 0.0, level[0] - run.half * level[1], camera), ends[0])
+    put(space_point(run, run.half, 0.0, level[0] + run.half * level[1], camera), ends[1])
     length = np.sqrt(np.sum((ends[1] - ends[0]) ** 2))
     direction = (ends[1] - ends[0]) / length
     normals, inward = np.zeros((2, 3)), np.zeros((2, 3))
     for k in range(flanks):
         normal = space_normal(run, planes[k], camera)
         normal -= np.sum(normal * direction) * direction  # the surface holds the edge
-        normals[k] = normal / np.sqrt(np.sum(normal * normal))
+        put(normal / np.sqrt(np.sum(normal * normal)), normals[k])
         across = sides[k] * _across(run, planes[k], direction, camera)
         across -= np.sum(across * normals[k]) * normals[k]
-        inward[k] = across / np.sqrt(np.sum(across * across))
+        put(across / np.sqrt(np.sum(across * across)), inward[k])
     return ends, normals, inward, length / (2.0 * run.half)
 
 
@@ -124,7 +125,7 @@ def silhouette(seen: Seen, outward: NDArray, u: NDArray, v: NDArray) -> Line:
     else:
         n, plane = rough_plane(seen, run, u, v, keep, level, side)
     planes, sides = np.zeros((2, 3)), np.array([side, -side])
-    planes[0] = plane
+    put(plane, planes[0])
     flanks = 1 if n > 0 else 0
     ends, normals, inward, metres = _line(run, level, planes, sides, flanks, seen.camera)
     direction = (ends[1] - ends[0]) / (2.0 * run.half * metres)
@@ -132,8 +133,8 @@ def silhouette(seen: Seen, outward: NDArray, u: NDArray, v: NDArray) -> Line:
     sigma_depth = reading_sigma(w_of(level[0], seen.camera), seen.camera, seen.noise)
     at_middle, tilt = pixel_variances(run, rms, pixels, systematic, STEP_SIGMA)
     moves = np.zeros((2, 3))
-    moves[0] = _across(run, plane, direction, seen.camera)
-    moves[1] = _deeper(run, level, direction, seen.camera)
+    put(_across(run, plane, direction, seen.camera), moves[0])
+    put(_deeper(run, level, direction, seen.camera), moves[1])
     offset, angle = _sigmas(moves, np.array([at_middle, covariance[0, 0]]), np.array([tilt, covariance[1, 1]]), metres)
     off = _off(seen, run, rms, level, u, v, keep, metres)
     if off > WILD * sigma_depth + 2.0 * metres + seen.outline:
@@ -176,7 +177,10 @@ def crease(seen: Seen, u: NDArray, v: NDArray) -> Line:
     at = run
     for again in range(2):
         for k in range(2):
-            counts[k], planes[k], covariances[k] = flank(seen, at, sides[k], 2.0 - again, beside)
+            counts[k], plane, covariance = flank(seen, at, sides[k], 2.0 - again, beside)
+            put(plane, planes[k])
+            for row in range(3):
+                put(covariance[row], covariances[k, row])
         if counts[0] == 0 or counts[1] == 0:
             break
         if not _turns(space_normal(at, planes[0], seen.camera), space_normal(at, planes[1], seen.camera), planes, covariances):
@@ -214,14 +218,17 @@ def _meeting(seen: Seen, at: Run, planes: NDArray, covariances: NDArray, u: NDAr
     c, slope = -(planes[0, 0] - planes[1, 0]) / steep, -(planes[0, 1] - planes[1, 1]) / steep
     run, _ = _met(at, planes[0], planes[1])
     for k in range(2):
-        planes[k], covariances[k] = _turned(planes[k], covariances[k], c, slope)
+        plane, covariance = _turned(planes[k], covariances[k], c, slope)
+        put(plane, planes[k])
+        for row in range(3):
+            put(covariance[row], covariances[k, row])
     steep = planes[0, 2] - planes[1, 2]
     sides = np.array([1.0, -1.0])
     ends, normals, inward, metres = _line(run, planes[0], planes, sides, 2, seen.camera)
     direction = (ends[1] - ends[0]) / (2.0 * run.half * metres)
     moves, offsets, tilts = np.zeros((2, 3)), np.zeros(2), np.zeros(2)
     for k in range(2):  # an error of one plane moves the line along the other
-        moves[k] = _across(run, planes[1 - k], direction, seen.camera)
+        put(_across(run, planes[1 - k], direction, seen.camera), moves[k])
         offsets[k] = covariances[k, 0, 0] / (steep * steep)
         tilts[k] = covariances[k, 1, 1] / (steep * steep)
     offset, angle = _sigmas(moves, offsets, tilts, metres)
@@ -238,14 +245,15 @@ def _ridge(seen: Seen, run: Run, rms: float, u: NDArray, v: NDArray, keep: NDArr
     for side in (1.0, -1.0):
         n, plane = rough_plane(seen, run, u, v, keep, level, side * (beside + 2.0))
         if n > 0:
-            planes[flanks], sides[flanks] = plane, side
+            put(plane, planes[flanks])
+            sides[flanks] = side
             flanks += 1
     ends, normals, inward, metres = _line(run, level, planes, sides, flanks, seen.camera)
     direction = (ends[1] - ends[0]) / (2.0 * run.half * metres)
     at_middle, tilt = pixel_variances(run, rms, int(keep.sum()), THINNED * seen.radius, 0.0)
     moves = np.zeros((2, 3))
-    moves[0] = _across(run, level, direction, seen.camera)
-    moves[1] = _deeper(run, level, direction, seen.camera)
+    put(_across(run, level, direction, seen.camera), moves[0])
+    put(_deeper(run, level, direction, seen.camera), moves[1])
     offset, angle = _sigmas(moves, np.array([at_middle, covariance[0, 0]]), np.array([tilt, covariance[1, 1]]), metres)
     off = _off(seen, run, rms, level, u, v, keep, metres)
     return Line(int(keep.sum()), ends, normals, inward, flanks, off, offset, angle)

@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.base.compiled import put
 from handey_studio.localization.edges import JUMP
 from handey_studio.localization.flanks import Seen, w_of
 from handey_studio.localization.lines import Line, crease, silhouette
@@ -61,7 +62,7 @@ def _bend(seen: Seen, u: NDArray, v: NDArray, members: NDArray) -> int:
     _, _, du, dv, _ = axis_of(x, y, np.ones(len(x), dtype=np.bool_))
     along = x * du + y * dv
     order = np.argsort(along, kind="mergesort")
-    members[:] = members[order]
+    put(members[order], members)
     along = along[order]
     n = len(members)
     if n < 2 * MIN_PIXELS:

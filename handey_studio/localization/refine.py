@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.base.compiled import put
 from handey_studio.localization.edges import JUMP
 from handey_studio.localization.evidence import KIND, Evidence, Limits, X, Y, Z, ray_at
 from handey_studio.localization.samples import ALONG, INTO_LEFT, INTO_RIGHT, PartSamples
@@ -213,10 +214,12 @@ def _refine(refined, samples, evidence, limits, weights, iterations, poses):
             still = step >= iterations // 2 and turn < STILL_RAD and shift < STILL * weights.face
             if step == iterations - 1 or still:
                 for c in range(6):
-                    covariance[n, c] = _solved(L, np.eye(7)[c])[:6]
+                    put(_solved(L, np.eye(7)[c]), covariance[n, c])
                 break
             if turn > MAX_TURN:
                 delta *= MAX_TURN / turn
-            R[n] = _turned_by(R[n], delta[:3])
-            t[n] += delta[3:6]
+            turned = _turned_by(R[n], delta[:3])
+            for row in range(3):
+                put(turned[row], R[n, row])
+                t[n, row] += delta[3 + row]
             margins[n] = max(margins[n] + delta[6], 0.0)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
+from handey_studio.base.compiled import put
 from handey_studio.geometry import HeightField
 from handey_studio.motion.cores import share
 from handey_studio.world import World
@@ -213,12 +214,15 @@ def _spread(squares: NDArray, filled: NDArray, gaps: NDArray, mine: NDArray, out
     """Distances for the slices `mine`: the root of the least of the `filled` slices' squares plus that of the gap to them."""
     for i in mine:
         best = out[i]
-        best[:] = squares[i]
+        for j in range(best.shape[0]):
+            put(squares[i, j], best[j])
         for other in filled:
             if other != i and abs(other - i) <= len(gaps):
                 for j in range(best.shape[0]):
                     _lower(best[j], squares[other, j], float(gaps[abs(other - i) - 1]))
-        best[:] = np.sqrt(best)
+        for j in range(best.shape[0]):
+            for k in range(best.shape[1]):
+                best[j, k] = np.sqrt(best[j, k])
 
 
 @njit(cache=True, nogil=True, fastmath=True)

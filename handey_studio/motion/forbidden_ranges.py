@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.base.compiled import put
 from handey_studio.motion.cores import share
 from handey_studio.motion.distance_field import Field
 from handey_studio.motion.marching import DOUBT, FREE, LACKING, SOLID, Circles, march, needs, place, refine, room
@@ -79,13 +80,11 @@ def first_ranges(field: Field, hinges: Hinges, these: Circles, turns: NDArray, s
 
 
 @njit(cache=True)
-def _axis(T: NDArray, axis: NDArray) -> NDArray:
-    """A line: the origin of T and an axis of its frame, in the frame that T maps to."""
-    out = np.empty(6)
+def _axis(T: NDArray, axis: NDArray, out: NDArray) -> None:
+    """A line (6,): the origin of T and an axis of its frame, in the frame that T maps to."""
     for i in range(3):
         out[i] = T[i, 3]
         out[3 + i] = T[i, 0] * axis[0] + T[i, 1] * axis[1] + T[i, 2] * axis[2]
-    return out
 
 
 @njit(cache=True)
@@ -99,7 +98,7 @@ def second_ranges(
     n2, k, groups = len(turns), len(these.radius), len(these.first) - 1
     local, before, work = np.empty((k, 9)), np.empty((1, 6)), room(k, groups, n2)
     place(hinges.T_first_second, these, local)
-    before[0] = _axis(np.eye(4), hinges.axes[0])
+    _axis(np.eye(4), hinges.axes[0], before[0])
     needs(local, these, k - groups - 1, k, turns, before, step / 2, work.need)
     for i in range(len(values)):
         if first[i] != FREE:
@@ -154,9 +153,11 @@ def _third_ranges(
     groups = len(these.first) - 1
     local, worlds, before, work = np.empty((k, 9)), np.empty((n1, 4, 4)), np.empty((2, 6)), room(k, groups, n3)
     for i in range(n1):
-        worlds[i] = turned(hinges.T_world_first, hinges.axes[0], values[0][i])
-    before[0] = _axis(hinges.T_first_second, hinges.axes[1])
-    before[1] = _axis(np.eye(4), hinges.axes[0])
+        T = turned(hinges.T_world_first, hinges.axes[0], values[0][i])
+        for axis in range(4):
+            put(T[axis], worlds[i, axis])
+    _axis(hinges.T_first_second, hinges.axes[1], before[0])
+    _axis(np.eye(4), hinges.axes[0], before[1])
     free = np.full(n3, FREE, np.int8)
     for j in mine:
         ready, blank = False, True
@@ -176,7 +177,7 @@ def _third_ranges(
                         work.known[:], blank = False, False
                     march(field, worlds[i], local, these, turns, before, step, tell, work, row)
                     if tell:
-                        wider.lacking[j, i, :n3] = work.lacking
+                        put(work.lacking, wider.lacking[j, i, :n3])
             _close(row, rows[i, j], least)
 
 

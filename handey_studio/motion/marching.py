@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.base.compiled import put
 from handey_studio.motion.distance_field import Field, clearance_at
 
 FREE, DOUBT, SOLID = 0, 1, 2
@@ -122,10 +123,11 @@ def march(
         return
     groups = len(these.first) - 1
     small, top = len(local) - groups - 1, len(local) - 1
-    work.around[begin:end] = row[begin:end] == DOUBT
+    for m in range(begin, end):
+        work.around[m] = row[m] == DOUBT
     work.lacking[:] = 0
     if _lacks(field, T, local, these.distance, top, turns, work.need, step, work.around, work.near, begin, end):
-        work.around[begin:end] = work.near[begin:end]
+        put(work.near[begin:end], work.around[begin:end])
         for group in range(groups):
             first, last = these.first[group], these.first[group + 1]
             if not _lacks(field, T, local, these.distance, small + group, turns, work.need, step, work.around, work.near, begin, end):

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.base.compiled import put
 from handey_studio.world.bounding_tree import box_gap
 from handey_studio.world.collision_bodies import Obstacles, Shapes
 from handey_studio.world.collision_queries import (
@@ -193,7 +194,7 @@ def prove(chain: Chain, shapes: Shapes, scene: Scene, motion: Motion, margin: fl
     opened = abs(motion.opening_end - motion.opening_start)
     open_bodies = np.zeros((MAX_HALVINGS + 2, bodies), np.bool_)
     open_pairs = np.zeros((MAX_HALVINGS + 2, pairs), np.bool_)
-    open_bodies[0] = shapes.link > 0
+    put(shapes.link > 0, open_bodies[0])
     for pair in range(pairs):
         open_pairs[0, pair] = scene.rules[shapes.name[shapes.pairs[pair, 0]], shapes.name[shapes.pairs[pair, 1]]] == CHECKED
     starts, halvings = np.zeros(MAX_HALVINGS + 2), np.zeros(MAX_HALVINGS + 2, np.int64)
@@ -228,7 +229,8 @@ def prove(chain: Chain, shapes: Shapes, scene: Scene, motion: Motion, margin: fl
             return Verdict(UNDECIDED, t, hit, checks)
         halvings[depth] += 1
         halvings[depth + 1] = halvings[depth]
-        open_bodies[depth + 1], open_pairs[depth + 1] = open_bodies[depth], open_pairs[depth]
+        put(open_bodies[depth], open_bodies[depth + 1])
+        put(open_pairs[depth], open_pairs[depth + 1])
         starts[depth], starts[depth + 1] = start + width / 2.0, start
         depth += 2
     return Verdict(PROVED, best_at, best, checks)

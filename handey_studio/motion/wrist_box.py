@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from handey_studio.base import Value, frozen_array
+from handey_studio.base.compiled import put
 from handey_studio.geometry.transforms import inverse
 from handey_studio.world import Held, Robot, arm_of
 from handey_studio.world.collision_bodies import Piece, held_pieces, robot_pieces
@@ -129,7 +130,7 @@ def _ball_around(points: NDArray) -> tuple[NDArray, float]:
                 most, far = square, p
         if most < least:
             least = most
-            best[:] = centre
+            put(centre, best)
         centre += (points[far] - centre) * (0.5 / (step + 2))
     return best, np.sqrt(least)
 

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from handey_studio.base.compiled import put
 from handey_studio.world.bounding_tree import box_gap
 from handey_studio.world.collision_bodies import Obstacles, Shapes
 from handey_studio.world.gjk import distance
@@ -50,7 +51,8 @@ def forward(chain: Chain, q: NDArray) -> NDArray:
     """Ts_world_link (n + 1, 4, 4) of the base and each moving link at q (n,) [rad]."""
     n = len(q)
     poses, hinge, turn = np.zeros((n + 1, 4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
-    poses[0] = chain.T_base
+    for row in range(4):
+        put(chain.T_base[row], poses[0, row])
     turn[3, 3] = 1.0
     for i in range(n):
         x, y, z = chain.axes[i]
