@@ -53,7 +53,7 @@ def test_the_range_finder_does_not_widen_a_bar():
     rng, errors = np.random.default_rng(3), []
     size = np.array([0.08, 0.03, 0.02])
     table = SolidBody("table", box((0.8, 0.8, 0.1)), from_xyz_rpy((0.48, 0.0, -0.05)), fixed=True)
-    for yaw in (0.2, 1.0, 2.5):
+    for yaw in (0.2, 1.0):
         bar = SolidBody("bar", box(size), from_xyz_rpy((0.48, 0.01, 0.01), (0.0, 0.0, yaw)))
         found = suggest([scan_of_map("bar", photograph(RangeFinder(), [table, bar], rng))])
         assert found.solid is not None
