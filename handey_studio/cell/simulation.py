@@ -10,7 +10,7 @@ from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.driver import Drive, Reference
 from handey_studio.cell.physics import CONTACT_TIME_S, STEP_S, add_bodies, mujoco, new_spec, pose_of
 from handey_studio.cell.robot_model import add_robot
-from handey_studio.cell.touches import Touches, normal_forces
+from handey_studio.cell.touches import Touches
 from handey_studio.geometry.transforms import to_wxyz
 from handey_studio.world.arm import Arm
 from handey_studio.world.robot import FINGERS
@@ -83,7 +83,7 @@ class Simulation:
         data.qfrc_applied[dofs] = np.clip(torque, -self._effort, self._effort)
         data.qfrc_applied[self.finger_dofs] = self._finger_push(fingers) + data.qfrc_bias[self.finger_dofs]
         mujoco.mj_step2(model, data)
-        self._touches.feel(owners, normal_forces(data.efc_force, data.contact.efc_address))
+        self._touches.feel(owners, data.efc_force, data.contact.efc_address)
 
     def _turn_with_hand(self, owners: NDArray) -> None:
         """Tell the grip's contacts, between bodies `owners` (n, 2), how pad and body would accelerate apart if no joint's rate changed.

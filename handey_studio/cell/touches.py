@@ -21,15 +21,15 @@ class Touches:
         """The pairs of bodies (n, 2) that touch at the beginning."""
         self._stood = {frozenset(pair) for pair in owners.tolist()}
 
-    def feel(self, owners: NDArray, forces: NDArray) -> None:
-        """The contacts of one step, between bodies `owners` (n, 2), with their normal forces (n,) [N]."""
+    def feel(self, owners: NDArray, efc_force: NDArray, efc_address: NDArray) -> None:
+        """The contacts of one step, between bodies `owners` (n, 2), whose forces `normal_forces` tells."""
         robots: list[bool] = np.any(self._is_robot[owners], axis=1).tolist()
         if not any(robots):
             return
         pairs = owners.tolist()
         by_pad = [{other for pair in pairs if pad in pair for other in pair if other != pad} for pad in self._pads]
         held = set.intersection(*by_pad)
-        for (a, b), of_robot, force in zip(pairs, robots, forces.tolist(), strict=True):
+        for (a, b), of_robot, force in zip(pairs, robots, normal_forces(efc_force, efc_address).tolist(), strict=True):
             first, second = (b, a) if self._is_robot[b] or (b in held and not self._is_robot[a]) else (a, b)
             if of_robot or (first in held and frozenset((a, b)) not in self._stood):
                 self._most[first, second] = max(force, self._most.get((first, second), 0.0))

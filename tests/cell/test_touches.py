@@ -11,7 +11,8 @@ def felt(*steps: list[tuple[int, int, float]]) -> dict:
     touches = Touches(np.isin(np.arange(6), (ROBOT, LEFT, RIGHT)), (LEFT, RIGHT))
     touches.stands(np.array([(PART, TABLE), (OTHER, TABLE)]))
     for step in steps:
-        touches.feel(np.array([pair[:2] for pair in step], dtype=int).reshape(-1, 2), np.array([pair[2] for pair in step]))
+        owners = np.array([pair[:2] for pair in step], dtype=int).reshape(-1, 2)
+        touches.feel(owners, np.array([pair[2] for pair in step]), np.arange(len(step)))
     return touches.most
 
 
