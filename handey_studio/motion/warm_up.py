@@ -2,15 +2,20 @@
 
 import numpy as np
 
+from handey_studio.geometry import HeightField, box
+from handey_studio.geometry.transforms import transform
 from handey_studio.motion.path import plan_path
 from handey_studio.motion.query import PathOptions
-from handey_studio.world import FINGERS, Robot, World
+from handey_studio.world import FINGERS, Part, PlacedPart, Robot, World
 from handey_studio.world.collision import collision_model
+
+BESIDE = (1.1, 1.1, 0.0)  # where the table's corner is bare of the arm
 
 
 def warm_up(robot: Robot) -> None:
-    """Compiles, or loads from the cache, all that collision and arm motion use, by planning a small motion above a bare table."""
-    world = World(robot)
+    """Compiles, or loads from the cache, all that collision and arm motion use: plans a small motion with a part and a map far beside."""
+    T = transform(None, BESIDE)
+    world = World(robot, parts=(PlacedPart("part", Part("part", box([0.02] * 3)), T),), terrain=HeightField(np.full((4, 4), 0.01), 0.01, T))
     model = collision_model(world)
     pairs = [(finger, "table") for finger in FINGERS]
     model.hand_contact(np.eye(4), robot.hand.opening_max, None, pairs)
