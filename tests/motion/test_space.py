@@ -109,6 +109,19 @@ def test_a_free_cell_is_free_all_over(held, step_deg, seed):
         assert clearance.keeps(mine.margin) or set(clearance.bodies) <= OWN, clearance
 
 
+def test_a_new_map_leaves_what_is_known_of_the_table():
+    """The space after another look is that of a fresh process, though the table's cells are kept, at either step."""
+    worlds = [replace(scene(2), terrain=scene(seed).terrain, parts=()) for seed in (2, 3)]
+    for step_deg in (5.0, 2.5):
+        space_of(mover(worlds[0], 0.05), WRISTS, step_deg, np.array([ROBOT.home]))
+        asked = configuration_space_module._scene_cells.cache_info().misses
+        kept = space_of(mover(worlds[1], 0.05), WRISTS, step_deg, np.array([ROBOT.home]))
+        assert configuration_space_module._scene_cells.cache_info().misses - asked == 1
+        for cached in ("_scene_cells", "_link_cells"):
+            getattr(configuration_space_module, cached).cache_clear()
+        assert (space_of(mover(worlds[1], 0.05), WRISTS, step_deg, np.array([ROBOT.home])).blocked == kept.blocked).all()
+
+
 def test_a_moved_part_costs_only_its_own():
     """The space after a part moved is that of a fresh process, though all that stays is kept; and both parts count, at either step."""
     brick = Part("brick", box([0.05, 0.08, 0.12]))
