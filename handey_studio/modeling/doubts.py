@@ -37,7 +37,7 @@ def _unexplained(scans: Sequence[ScanTruth], explained: float) -> Check:
     where = "in front of" if median > 0 else "behind"
     fix = "Move it outward, or join what is missing there" if median > 0 else "Move it inward, or cut away what is not there"
     sentence += f"; most of the others are {measured(abs(median), 'm')} {where} face {face}."
-    return Check(UNEXPLAINED, False, sentence, f"{fix}; another object there does not count.", (face,), _some(points[there]))
+    return Check(UNEXPLAINED, False, sentence, f"{fix}, unless another object stands there.", (face,), _some(points[there]))
 
 
 def _seen_through(scan: ScanTruth) -> Check:
