@@ -53,10 +53,11 @@ def test_the_range_finder_does_not_widen_a_bar():
     rng, errors = np.random.default_rng(3), []
     size = np.array([0.08, 0.03, 0.02])
     table = SolidBody("table", box((0.8, 0.8, 0.1)), from_xyz_rpy((0.48, 0.0, -0.05)), fixed=True)
-    for yaw in (0.2, 1.0):
+    for yaw in (0.6, 2.9):
         bar = SolidBody("bar", box(size), from_xyz_rpy((0.48, 0.01, 0.01), (0.0, 0.0, yaw)))
         found = suggest([scan_of_map("bar", photograph(RangeFinder(), [table, bar], rng))])
         assert found.solid is not None
         errors.append(aligned_box(found.solid) - np.sort(size))
-    assert np.abs(errors).max() < 0.0004 and np.abs(np.mean(errors, axis=0)).max() < 0.00025
+    width = np.array(errors)[:, 1]
+    assert np.abs(errors).max() < 0.00045 and np.abs(width).max() < 0.00025
     assert rim_of(1.0) == 0.5 and rim_of(4.0) == 0.25 and rim_of(0.0) == 0.5
