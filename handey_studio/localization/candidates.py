@@ -9,15 +9,18 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.localization.distinct import distinct, probe_points
-from handey_studio.localization.hypotheses import FELL, Assignments, hypothesize, hypothesize_parallel, hypothesize_single, joined
+from handey_studio.localization.glance import unopposed
+from handey_studio.localization.hypotheses import FELL, Assignments, hypothesize, joined
 from handey_studio.localization.pairs import data_lines, data_pairs, data_parallels, model_edges, model_pairs, model_parallels
+from handey_studio.localization.parallel_hypotheses import hypothesize_parallel
 from handey_studio.localization.promise import FITTED, promise_features
 from handey_studio.localization.refine import Refined, refine
 from handey_studio.localization.samples import DENSER, part_samples, thinned
 from handey_studio.localization.score import Rated, Score, scores
 from handey_studio.localization.search import Search, footing
 from handey_studio.localization.second_look import second_look
-from handey_studio.localization.verify import Verdict, unopposed, verify
+from handey_studio.localization.single_hypotheses import hypothesize_single
+from handey_studio.localization.verify import Verdict, verify
 from handey_studio.world.part import Part
 
 FAR_BELOW = 6.0  # slacks below the table, beyond which a rough pose is not worth refining

@@ -14,11 +14,13 @@ from handey_studio.geometry.transforms import apply, inverse, rotate
 from handey_studio.localization.edge_pair import EdgePair, edge_pair
 from handey_studio.localization.evidence import Evidence, Limits
 from handey_studio.localization.pairs import model_edges
+from handey_studio.localization.posed import GRAZING
+from handey_studio.localization.predicted_edges import edge_states
 from handey_studio.localization.result import LocateOptions
 from handey_studio.localization.samples import ALONG, PartSamples, part_samples
 from handey_studio.localization.search import Search, look
 from handey_studio.localization.segments import DataEdge
-from handey_studio.localization.verify import GRAZING, MIN_EDGE_SHARE, MIN_VISIBLE_SHARE, edge_states, verify
+from handey_studio.localization.verify import MIN_EDGE_SHARE, MIN_VISIBLE_SHARE, verify
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.sensing.drawing import rendered_depth
 from handey_studio.world.part import Part

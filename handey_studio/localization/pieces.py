@@ -5,11 +5,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base.compiled import put
+from handey_studio.localization.creases import crease
 from handey_studio.localization.edges import JUMP
 from handey_studio.localization.flanks import Seen, w_of
-from handey_studio.localization.lines import Line, crease, silhouette
+from handey_studio.localization.lines import Line
 from handey_studio.localization.runs import MIN_PIXELS, axis_of
 from handey_studio.localization.shares import shared
+from handey_studio.localization.silhouettes import silhouette
 from handey_studio.localization.surface import reading_sigma
 
 MAX_BENDS = 4  # rounds of cutting a segment in two

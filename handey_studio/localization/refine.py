@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from handey_studio.base.compiled import put
 from handey_studio.localization.edges import JUMP
 from handey_studio.localization.evidence import KIND, Evidence, Limits, X, Y, Z, ray_at
+from handey_studio.localization.posed import GRAZING, ON, facing, placed, reading_at, turned
+from handey_studio.localization.predicted_edges import edge_state
 from handey_studio.localization.samples import ALONG, INTO_LEFT, INTO_RIGHT, PartSamples
 from handey_studio.localization.shares import shared
-from handey_studio.localization.verify import GRAZING, LEAST_POSES, ON, edge_state, facing, placed, reading_at, turned
+from handey_studio.localization.verify import LEAST_POSES
 from handey_studio.sensing.depth_view import DepthView
 
 TAPERING = 0.5  # limits shrink to this share over the iterations
@@ -218,8 +220,8 @@ def _refine(refined, samples, evidence, limits, weights, iterations, poses):
                 break
             if turn > MAX_TURN:
                 delta *= MAX_TURN / turn
-            turned = _turned_by(R[n], delta[:3])
+            R_next = _turned_by(R[n], delta[:3])
             for row in range(3):
-                put(turned[row], R[n, row])
+                put(R_next[row], R[n, row])
                 t[n, row] += delta[3 + row]
             margins[n] = max(margins[n] + delta[6], 0.0)

@@ -18,7 +18,7 @@ class LocateOptions:
 
     max_poses: int = 5
     min_score: float = 0.31
-    min_visible_fraction: float = 0.1
+    min_visible_fraction: float = 0.15
     min_edge_m: float | None = None
     max_data_edges: int = 600
     max_hypotheses: int = 40000

@@ -12,7 +12,7 @@ from handey_studio.world.part import Part
 EDGE_SAMPLES = 320
 FACE_SAMPLES = 900
 DENSER = 6  # times as many for the last refinement, which averages the noise of readings
-THINNING = 5
+THINNING = 2
 MIN_PER_EDGE = 4
 MIN_PER_FACE = 12
 ALONG, LEFT, RIGHT, INTO_LEFT, INTO_RIGHT = range(5)  # directions of an edge

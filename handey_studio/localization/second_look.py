@@ -12,8 +12,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.evidence import Evidence, ray_at
+from handey_studio.localization.posed import GRAZING, turned
 from handey_studio.localization.shares import shared
-from handey_studio.localization.verify import GRAZING, LEAST_POSES, STEEP, turned
+from handey_studio.localization.verify import LEAST_POSES, STEEP
 from handey_studio.sensing.drawing import draw, window
 from handey_studio.world.part import Part
 

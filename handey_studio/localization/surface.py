@@ -13,17 +13,24 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.localization.shares import shared
+from handey_studio.localization.window_planes import (
+    MIN_SAMPLES,
+    gated,
+    over_windows,
+    plane_through,
+    take_row,
+    take_window,
+    whole_window,
+    window_of,
+)
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.sensing.drawing import Camera, camera_of
 
 MAX_NORMAL_ERROR = 0.05  # rad; the window grows until the noise of a normal is below
-MAX_SLOPE = 2.7  # tan 70°: steeper surfaces return too few readings to be told from a jump
-MIN_SAMPLES = 5
 MAX_RADIUS_PX = 6
 TYPICAL_READINGS = 30_000
 LEAST_ROWS = 32  # that are worth a share
 ONE_PLANE = 1.6  # sigmas rms about a plane, up to which it is taken to explain the whole window
-
 Noise = tuple[float, float]
 
 
@@ -50,7 +57,7 @@ def surface_of(view: DepthView) -> Surface:
     """The surface that a view shows: at each reading a normal and the slopes of depth, by least squares in a window around it.
 
     The window is as small as a normal's error of `MAX_NORMAL_ERROR` allows, and leaves out what lies across a jump; NaN where fewer than
-    `MIN_SAMPLES` readings are left, or the surface is steeper than `MAX_SLOPE`.
+    `MIN_SAMPLES` readings are left, or the surface is steeper than `MAX_SLOPE` of `window_planes`.
     """
     typical = _typical(view.depth)
     pixel = float(1.0 / view.projection.pixels_per_metre(typical))
@@ -117,113 +124,6 @@ def _normal(u, v, d, gu, gv, camera):
     return nx * scale, ny * scale, nz * scale
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _solve(n, su, sv, sd, suu, suv, svv, sud, svd):
-    """Slopes along u and v of the plane with these sums, and whether they fix it."""
-    suu, suv, svv = suu - su * su / n, suv - su * sv / n, svv - sv * sv / n
-    sud, svd = sud - su * sd / n, svd - sv * sd / n
-    det = suu * svv - suv * suv
-    fixed = det >= 1e-3 * (suu + svv) ** 2 / 4 + 1e-12
-    return ((svv * sud - suv * svd) / det, (suu * svd - suv * sud) / det, True) if fixed else (0.0, 0.0, False)
-
-
-@njit(cache=True)
-def _window(radius: int, step: int) -> NDArray:
-    """The pixels of a window, every `step`-th: rows of u, v, both counted from its middle, and the greater of them."""
-    side = np.arange(-radius, radius + 1, step)
-    out = np.empty((3, len(side) ** 2))
-    for k in range(out.shape[1]):
-        out[0, k], out[1, k] = side[k % len(side)], side[k // len(side)]
-        out[2, k] = max(abs(out[0, k]), abs(out[1, k]))
-    return out
-
-
-@njit(cache=True)
-def _take_window(depth, v, u, radius, step, out):
-    """The readings of a window, every `step`-th, less its middle's; NaN where there are none."""
-    height, width = depth.shape
-    within = radius <= v < height - radius and radius <= u < width - radius
-    k, d = 0, depth[v, u]
-    for y in range(v - radius, v + radius + 1, step):
-        for x in range(u - radius, u + radius + 1, step):
-            out[k] = depth[y, x] - d if within or (0 <= y < height and 0 <= x < width) else np.nan
-            k += 1
-
-
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
-def _plane(readings, window, gate, reach, slope, near, rough):
-    """The plane through a window's readings that lie within `gate` + `reach` a pixel of the middle's and within `near` + `rough` a
-    pixel of a plane of that slope: its slope, how many they are (0 if they fix none), the sum of their squares about it, and
-    how far it misses the middle's."""
-    n = su = sv = sd = suu = suv = svv = sud = svd = sdd = 0.0
-    us, vs, rings = window[0], window[1], window[2]
-    for k in range(len(readings)):
-        e, du, dv, ring = readings[k], us[k], vs[k], rings[k]
-        fits = (abs(e) <= gate + reach * ring) & (abs(e - slope[0] * du - slope[1] * dv) <= near + rough * ring)
-        w, e = (1.0, e) if fits else (0.0, 0.0)
-        n, su, sv, sd, sdd = n + w, su + w * du, sv + w * dv, sd + e, sdd + e * e
-        suu, suv, svv = suu + w * du * du, suv + w * du * dv, svv + w * dv * dv
-        sud, svd = sud + du * e, svd + dv * e
-    gu, gv, fixed = _solve(n, su, sv, sd, suu, suv, svv, sud, svd)
-    if n < MIN_SAMPLES or not fixed:
-        return (0.0, 0.0), 0.0, 0.0, 0.0
-    mean = sd / n
-    squares = sdd - sd * mean - gu * (sud - su * mean) - gv * (svd - sv * mean)
-    return (gu, gv), n, squares, mean - gu * su / n - gv * sv / n
-
-
-@njit(cache=True)
-def _gated(readings, window, metres, gate):
-    """Slope at a pixel by two rounds of least squares: first over all that may be connected, then over what fits the first."""
-    reach = MAX_SLOPE * metres
-    slope, n, _, _ = _plane(readings, window, gate, reach, (0.0, 0.0), np.inf, 0.0)
-    if n == 0.0:
-        return slope, False
-    again, n, _, _ = _plane(readings, window, gate, reach, slope, gate, 0.15 * reach)
-    return (again if n > 0.0 else slope), True
-
-
-@njit(cache=True, error_model="numpy")
-def _take_row(columns, depth, row, reference, sign):
-    """A row's readings into (or, with sign −1, out of) the sums of each column: holes, depth, v·depth, depth²."""
-    y = row - 0.5 * depth.shape[0]
-    holes, first, tilted, squares = columns[0], columns[1], columns[2], columns[3]
-    readings = depth[row]
-    for u in range(len(readings)):
-        e = readings[u] - reference
-        hole = np.isnan(e)
-        e = 0.0 if hole else sign * e
-        holes[u] += sign if hole else 0.0
-        first[u] += e
-        tilted[u] += y * e
-        squares[u] += e * e * sign
-
-
-@njit(cache=True, error_model="numpy")
-def _over_windows(columns, y, radius, sums):
-    """The columns' sums added up over each window of a row, from the first that lies within the view: holes, depth, u·depth, v·depth,
-    depth², with u and v counted from the window's middle, in row y."""
-    inner = columns.shape[1] - 2 * radius
-    sums[:] = 0.0
-    for k in range(2 * radius + 1):
-        holes, first, tilted, squares = columns[0, k:], columns[1, k:], columns[2, k:], columns[3, k:]
-        for u in range(inner):
-            sums[0, u] += holes[u]
-            sums[1, u] += first[u]
-            sums[2, u] += (k - radius) * first[u]
-            sums[3, u] += tilted[u] - y * first[u]
-            sums[4, u] += squares[u]
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _whole(sums, k, e, radius):
-    """As `_plane`, of all readings of a window without holes, from its sums; `e` is the middle's."""
-    n = (2.0 * radius + 1.0) ** 2
-    spread = n * radius * (radius + 1.0) / 3.0
-    gu, gv, mean = sums[2, k] / spread, sums[3, k] / spread, sums[1, k] / n
-    return (gu, gv), n, sums[4, k] - mean * sums[1, k] - (gu * gu + gv * gv) * spread, mean - e
-
-
 @njit(cache=True, nogil=True)
 def _slopes(
     depth: NDArray, camera: Camera, noise: Noise, radius: int, step: int, rows: tuple[int, int], slopes: NDArray, normals: NDArray
@@ -231,16 +131,16 @@ def _slopes(
     """Slopes (H, W, 2) [m/px] and normals (H, W, 3) of some rows, left as they are where there are too few readings."""
     height, width = depth.shape
     columns, sums = np.zeros((4, width)), np.zeros((5, max(width - 2 * radius, 0)))
-    whole, coarse = _window(radius, 1), _window(radius, step)
+    whole, coarse = window_of(radius, 1), window_of(radius, step)
     readings, fewer = np.empty(whole.shape[1]), np.empty(coarse.shape[1])
     for v in range(max(rows[0] - radius, 0), min(rows[0] + radius, height)):
-        _take_row(columns, depth, v, noise[1], 1.0)
+        take_row(columns, depth, v, noise[1], 1.0)
     for v in range(rows[0], rows[1]):
         if v + radius < height:
-            _take_row(columns, depth, v + radius, noise[1], 1.0)
+            take_row(columns, depth, v + radius, noise[1], 1.0)
         if v - radius > max(rows[0] - radius, 0):
-            _take_row(columns, depth, v - radius - 1, noise[1], -1.0)
-        _over_windows(columns, v - 0.5 * height, radius, sums)
+            take_row(columns, depth, v - radius - 1, noise[1], -1.0)
+        over_windows(columns, v - 0.5 * height, radius, sums)
         inside = radius <= v < height - radius
         for u in range(width):
             d = depth[v, u]
@@ -248,15 +148,15 @@ def _slopes(
                 continue
             k = u - radius
             if inside and 0 <= k < sums.shape[1] and sums[0, k] == 0.0:
-                slope, n, squares, off = _whole(sums, k, d - noise[1], radius)
+                slope, n, squares, off = whole_window(sums, k, d - noise[1], radius)
             else:
-                _take_window(depth, v, u, radius, 1, readings)
-                slope, n, squares, off = _plane(readings, whole, np.inf, 0.0, (0.0, 0.0), np.inf, 0.0)
+                take_window(depth, v, u, radius, 1, readings)
+                slope, n, squares, off = plane_through(readings, whole, np.inf, 0.0, (0.0, 0.0), np.inf, 0.0)
             sigma = reading_sigma(d, camera, noise)
             limit, known = ONE_PLANE * sigma, n >= 2 * MIN_SAMPLES
             if not (known and squares <= limit * limit * (n - 3.0) and abs(off) <= 3.0 * limit):
-                _take_window(depth, v, u, radius, step, fewer)
-                slope, known = _gated(fewer, coarse, pixel_size(d, camera), 4.0 * sigma)
+                take_window(depth, v, u, radius, step, fewer)
+                slope, known = gated(fewer, coarse, pixel_size(d, camera), 4.0 * sigma)
             if known:
                 slopes[v, u, 0], slopes[v, u, 1] = slope
                 normals[v, u, 0], normals[v, u, 1], normals[v, u, 2] = _normal(u, v, d, slope[0], slope[1], camera)

@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 from handey_studio.geometry.lines import relative_pose
 from handey_studio.geometry.transforms import transform
 from handey_studio.localization.distinct import displacement
-from handey_studio.localization.hypotheses import hypothesize, hypothesize_single
+from handey_studio.localization.hypotheses import hypothesize
 from handey_studio.localization.pairs import data_lines, data_pairs, data_parallels, model_edges, model_pairs
 from handey_studio.localization.result import pose_matrix
+from handey_studio.localization.single_hypotheses import hypothesize_single
 from handey_studio.localization.tolerances import SIGMAS, MatchTolerances, allowed, allowed_apart, pair_sigmas, sure, tolerances
 from handey_studio.sensing.depth_view import DepthView, Pinhole
 from tests.localization.test_hypotheses import BRICK, SKEW, L, edge_of
