@@ -91,18 +91,26 @@ def _fan(corners: NDArray, polygon: list[int]) -> NDArray:
     return np.asarray(polygon)[local.face_triangles(0)]
 
 
+def standing_for(corners: NDArray, within: float = WELD_M) -> NDArray:
+    """For each corner (n, 3) the number of the one that stands for all that are `within` [m] of it, or of one another."""
+    pairs = KDTree(corners).query_pairs(within, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(corners),) * 2)
+    count, group = connected_components(links, directed=False)
+    first = np.full(count, len(corners))
+    np.minimum.at(first, group, np.arange(len(corners)))
+    return first[group]
+
+
 def welded(corners: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray]:
     """Coinciding corners made one, which stand in the order of their coordinates; triangles that lost a corner dropped."""
-    pairs = KDTree(corners).query_pairs(WELD_M, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(corners),) * 2)
-    _, place = connected_components(links, directed=False)
-    _, first = np.unique(place, return_index=True)
-    order = np.lexsort(np.round(corners[first] / WELD_M).T[::-1])
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    triangles = rank[place[triangles]]
+    stands = standing_for(corners)
+    kept = np.unique(stands)
+    kept = kept[np.lexsort(np.round(corners[kept] / WELD_M).T[::-1])]
+    number = np.empty(len(corners), dtype=np.int64)
+    number[kept] = np.arange(len(kept))
+    triangles = number[stands[triangles]]
     distinct = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return corners[first[order]], triangles[distinct]
+    return corners[kept], triangles[distinct]
 
 
 def check_closed(triangles: NDArray) -> None:

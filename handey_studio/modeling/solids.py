@@ -15,9 +15,10 @@ from scipy.sparse.csgraph import connected_components
 
 from handey_studio.base import BadInput, measured
 from handey_studio.geometry import Face, Polyhedron, polyhedron_from_polygons
+from handey_studio.geometry.meshes import standing_for
 from handey_studio.geometry.soundness import unmatched_sides
 from handey_studio.modeling.planes import corners_on_planes, nearest_plane, onto_planes, told_point
-from handey_studio.modeling.soundness import SLIVER_M, checked, narrowest, sound, welded, without_slivers
+from handey_studio.modeling.soundness import SLIVER_M, checked, narrowest, sound, without_slivers
 
 FLUSH_M = 2e-5  # a face of a tool this near to a plane of the solid is meant to be in it; what lay between would be a sliver
 LARGER_M = 5e-7  # so much larger than asked is every tool while it works
@@ -158,7 +159,7 @@ def _polyhedron(result: manifold3d.Manifold, normals: NDArray, offsets: NDArray,
     vertices, triangles = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
     triangles = _one_body(vertices, triangles, what)
     vertices = onto_planes(vertices, triangles, normals, offsets, FOUND_M)
-    triangles = welded(vertices)[triangles]
+    triangles = standing_for(vertices)[triangles]
     triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
     _, twice = unmatched_sides(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]))
     if len(twice):

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from handey_studio.base import BadInput, measured
 from handey_studio.geometry import Face, Polyhedron, polyhedron_from_polygons
+from handey_studio.geometry.meshes import standing_for
 from handey_studio.geometry.soundness import crossings
 from handey_studio.modeling.planes import SAME_M, told_point
 
@@ -23,7 +24,7 @@ def sound(vertices: NDArray, faces: Sequence[Face]) -> Polyhedron:
 
     Coinciding corners are welded and coplanar neighbours merged. Raises BadInput with one sentence when no sound solid is left.
     """
-    number = welded(vertices)
+    number = standing_for(vertices, SAME_M)
     polygons: list[list[int]] = []
     for face in faces:
         loops = [_without_repeats([int(number[c]) for c in loop]) for loop in face.loops]
@@ -39,7 +40,7 @@ def with_same_faces(solid: Polyhedron, vertices: NDArray) -> Polyhedron | None:
 
     Raises BadInput with one sentence when the surface would pass through itself.
     """
-    if (welded(vertices) != np.arange(len(vertices))).any():
+    if (standing_for(vertices, SAME_M) != np.arange(len(vertices))).any():
         return None
     changed = Polyhedron(vertices, solid.faces)
     if any(shrunk(vertices[list(face.outer)]) for face in solid.faces):
@@ -141,15 +142,6 @@ def _groups(pairs: list[tuple[int, int]], count: int) -> int:
     """How many groups of things 0 … count − 1 the pairs leave unconnected."""
     rows, columns = np.array(pairs).T
     return int(connected_components(coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)), directed=False)[0])
-
-
-def welded(vertices: NDArray, within: float = SAME_M) -> NDArray:
-    """For each corner (n, 3) the number of the one that stands for all that are `within` [m] of it."""
-    near = np.linalg.norm(vertices[:, None] - vertices[None], axis=2) < within
-    _, group = connected_components(coo_array(near), directed=False)
-    first = np.full(group.max() + 1, len(vertices))
-    np.minimum.at(first, group, np.arange(len(vertices)))
-    return first[group]
 
 
 def _without_repeats(loop: list[int]) -> list[int]:
