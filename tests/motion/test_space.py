@@ -112,6 +112,7 @@ def test_a_free_cell_is_free_all_over(held, step_deg, seed):
 def test_a_new_map_leaves_what_is_known_of_the_table():
     """The space after another look is that of a fresh process, though the table's cells are kept, at either step."""
     worlds = [replace(scene(2), terrain=scene(seed).terrain, parts=()) for seed in (2, 3)]
+    configuration_space_module._scene_cells.cache_clear()  # other tests ask for these worlds too
     for step_deg in (5.0, 2.5):
         space_of(mover(worlds[0], 0.05), WRISTS, step_deg, np.array([ROBOT.home]))
         asked = configuration_space_module._scene_cells.cache_info().misses
