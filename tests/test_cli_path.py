@@ -1,6 +1,7 @@
 """`handey path`: MoveIt's scenes and requests, answered with a path, a reason, or one sentence about what is wrong with the file."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import fcl
@@ -14,7 +15,6 @@ from handey_studio.world import arm_of, load_robot
 from handey_studio.world.collision import collision_model
 from handey_studio.world.envelope import enveloped
 from handey_studio.world.moveit import read_request, read_scene
-from handey_studio.world.robot import mounted_at
 
 ROBOT = load_robot("robots/ur5")
 START, GOAL = [-1.2, -1.2, 1.2, -1.6, -1.57, 0.0], [1.2, -1.2, 1.2, -1.6, -1.57, 0.0]
@@ -168,7 +168,7 @@ def test_missing_files_and_robots(tmp_path, capsys):
 
 
 def test_bodies_are_in_the_frame_of_the_base_and_poses_compose(tmp_path):
-    turned = mounted_at(ROBOT, from_xyz_rpy((1.0, 2.0, 0.5), (0, 0, np.pi / 2)))
+    turned = replace(ROBOT, T_world_base=from_xyz_rpy((1.0, 2.0, 0.5), (0, 0, np.pi / 2)))
     given = {**PILLAR, "pose": {"position": {"x": 0.0, "y": 0.0, "z": 1.0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}}
     given["primitives"] = [{"type": 1, "dimensions": ["1e-1", 0.1, 0.6]}]
     (tmp_path / "s.yaml").write_text(yaml.safe_dump(scene_of(given)))

@@ -77,8 +77,3 @@ def overlap(a: Polytope, T_world_a: NDArray, b: Polytope, T_world_b: NDArray) ->
     along_a = (a.corners @ R_a.T + T_world_a[:3, 3]) @ axes.T
     along_b = (b.corners @ R_b.T + T_world_b[:3, 3]) @ axes.T
     return float(np.minimum(along_a.max(axis=0) - along_b.min(axis=0), along_b.max(axis=0) - along_a.min(axis=0)).min())
-
-
-def body_overlap(a: SolidBody, b: SolidBody) -> float:
-    """Greatest depth [m] by which pieces of two bodies overlap; negative when the bodies are apart."""
-    return max(overlap(p, a.T_world_body, q, b.T_world_body) for p in polytopes_of(a) for q in polytopes_of(b))

@@ -1,6 +1,6 @@
 """Robots: plain descriptions, read from `robot.toml` by `robot_file`. The living arm model is built from them in each process."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,8 +130,3 @@ class Robot(Value):
     def limit_margin(self, q: NDArray) -> NDArray:
         """Least distance [rad] to a joint limit, for configurations (..., n); negative outside."""
         return np.minimum(q - self.lower, self.upper - q).min(axis=-1)
-
-
-def mounted_at(robot: Robot, T_world_base: NDArray) -> Robot:
-    """The same robot standing elsewhere."""
-    return replace(robot, T_world_base=T_world_base)

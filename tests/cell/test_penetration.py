@@ -9,9 +9,10 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.penetration import body_overlap, overlap, polytope
+from handey_studio.cell.penetration import overlap, polytope
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, transform
+from tests.cell.overlaps import body_overlap
 
 HALF = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 

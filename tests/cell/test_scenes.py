@@ -10,7 +10,6 @@ import pytest
 from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody, fixed_bodies
 from handey_studio.cell.camera import DepthCamera, SensorFaults, beside_jumps, look_exactly, pixels_alone, with_faults
-from handey_studio.cell.penetration import body_overlap
 from handey_studio.cell.physics import settle
 from handey_studio.cell.scene_files import load_scene, save_scene
 from handey_studio.cell.scenes import SceneOptions, random_scene
@@ -18,6 +17,7 @@ from handey_studio.cell.workcell import Workcell
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, inverse, pose_difference, transform
 from handey_studio.sensing.depth_view import Orthographic, Pinhole
+from tests.cell.overlaps import body_overlap
 
 CLEAN = SensorFaults(noise_m=0.0, step_m=0.0, grazing_lost=0.0, jump_lost=0.0, jump_mixed=0.0)
 DOWN = transform(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 0.6))
