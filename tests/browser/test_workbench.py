@@ -40,6 +40,11 @@ def test_an_empty_workbench_tells_how_to_fill_it(studio, visit, tmp_path):
     for tab in ("Located", "Grasp", "Path", "Ledger", "Result"):
         page.get_by_role("tab", name=tab).click()
         pane(page, f"{EMPTY.get(tab, tab.lower())}-empty").wait_for()
+    press(page, "Guide")
+    page.get_by_role("dialog").get_by_text("The configuration space").first.wait_for()
+    page.get_by_role("button", name="Close", exact=True).evaluate("button => button.click()")  # a notice may lie over it
+    press(page, "Keys")
+    pane(page, "keys").get_by_text("play or pause").wait_for()
 
 
 def test_what_the_user_set_is_undone_and_redone(studio, visit, tmp_path):
@@ -148,7 +153,7 @@ def test_the_page_stays_live_while_planning_and_cancel_ends_it(studio, visit, tm
     workbench = studio(fresh_session(tmp_path), run=patient)
     page = visit(workbench)
     press(page, "Plan")
-    wait_until(lambda: "grasp group" in pane(page, "next-step").inner_text())
+    wait_until(lambda: "Grasp group" in pane(page, "next-step").inner_text())
     page.get_by_role("tab", name="View").click()
     page.get_by_role("checkbox", name="Robot").uncheck()
     wait_until(lambda: "robot" in workbench.state.session.view.hidden_layers)
@@ -166,7 +171,7 @@ def test_a_browser_that_leaves_while_planning_finds_it_again(studio, visit, tmp_
     page.context.close()
     wait_until(lambda: workbench.state.viewers == 0)
     page = visit(workbench, ready="Cancel")
-    wait_until(lambda: "grasp group" in pane(page, "next-step").inner_text())
+    wait_until(lambda: "Grasp group" in pane(page, "next-step").inner_text())
     press(page, "Cancel")
     wait_until(lambda: workbench.state.job is None)
 
