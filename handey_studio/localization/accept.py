@@ -47,8 +47,10 @@ class Weighing:
 def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPose], list[Hypothesis]]:
     """The poses that stand, most probable first, and every candidate with why it fell: the accepted first, then by probability."""
     start = time.perf_counter()
-    falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _objection(search, candidate)) is not None}
+    falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _sunk(search, candidate)) is not None}
     weighing = _weighed(search, candidates, falls)
+    # What shows too little to be told may still be what the readings are: it was weighed against the others.
+    falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _unseen(search, candidate)) is not None} | falls
     falls |= {
         n: _improbable(search, weighing, n) for n, p in enumerate(weighing.probability) if p < search.options.min_score and n not in falls
     }
@@ -62,15 +64,16 @@ def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPos
     return poses, hypotheses
 
 
-def _objection(search: Search, candidate: Candidate) -> Fall | None:
-    """The first thing that rules a candidate out by itself."""
-    options, allowed = search.options, 4.0 * search.slack
-    if candidate.below > allowed:
-        return Fall("it would stand below the table", candidate.below, allowed, "m")
-    visible = float(candidate.verdict.visible_fraction[0])
-    if visible < options.min_visible_fraction:
-        return Fall("too little of it is seen", visible, options.min_visible_fraction)
-    return None
+def _sunk(search: Search, candidate: Candidate) -> Fall | None:
+    """Whether it cannot be there at all."""
+    allowed = 4.0 * search.slack
+    return Fall("it would stand below the table", candidate.below, allowed, "m") if candidate.below > allowed else None
+
+
+def _unseen(search: Search, candidate: Candidate) -> Fall | None:
+    """Whether less of it is seen than is asked for."""
+    visible, least = float(candidate.verdict.visible_fraction[0]), search.options.min_visible_fraction
+    return Fall("too little of it is seen", visible, least) if visible < least else None
 
 
 def _weighed(search: Search, candidates: list[Candidate], falls: dict[int, Fall]) -> Weighing:
