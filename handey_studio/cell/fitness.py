@@ -33,16 +33,17 @@ def visible_share(finder: RangeFinder, bodies: Sequence[SolidBody], target: Soli
     return float(seen.mean()) if len(seen) else 0.0
 
 
-def graspable(hand: Hand, target: SolidBody, bodies: Sequence[SolidBody]) -> bool:
-    """Whether the open hand fits somewhere over two parallel faces of the target, from above, touching nothing.
+def graspable(hand: Hand, target: SolidBody, bodies: Sequence[SolidBody], closing_tilt: float = CLOSING_TILT) -> bool:
+    """Whether the open hand fits somewhere over two parallel faces of the target, from above, touching nothing, while it closes along a
+    direction whose slope (a sine) is at most `closing_tilt`.
 
     A coarse look at a few hand positions: it says that the task is fair, not how to grasp.
     """
     others = [body for body in bodies if body.name != target.name]
-    return any(_fits(hand, T_world_hand, opening, target, others) for T_world_hand, opening in _trials(hand, target))
+    return any(_fits(hand, T_world_hand, opening, target, others) for T_world_hand, opening in _trials(hand, target, closing_tilt))
 
 
-def _trials(hand: Hand, target: SolidBody) -> list[tuple[NDArray, float]]:
+def _trials(hand: Hand, target: SolidBody, closing_tilt: float) -> list[tuple[NDArray, float]]:
     """Hand poses and openings over each pair of opposite faces."""
     normals = target.solid.normals @ target.T_world_body[:3, :3].T
     top = target.corners_world[:, 2].max()
@@ -50,7 +51,7 @@ def _trials(hand: Hand, target: SolidBody) -> list[tuple[NDArray, float]]:
     for f, normal in enumerate(normals):
         opposite = np.nonzero(normals @ normal < -1 + 1e-6)[0]
         for width in target.solid.offsets[f] + target.solid.offsets[opposite]:
-            if abs(normal[2]) > CLOSING_TILT or not 0 < width <= hand.opening_max - 2 * PLAY_M:
+            if abs(normal[2]) > closing_tilt or not 0 < width <= hand.opening_max - 2 * PLAY_M:
                 continue
             for tilt, depth, place in product(TILTS_RAD, DEPTHS_M, _places(target, f, normal, width)):
                 trials.append((_hand_over(normal, float(tilt), (*place[:2], max(place[2], top - depth))), width + 2 * PLAY_M))

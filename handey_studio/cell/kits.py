@@ -1,7 +1,8 @@
 """A kit to be sorted: ten parts dropped in a pile, and a tray with a place for each, all in one scan's view.
 
-By construction it can be sorted: by the true bodies there is an order in which each part in its turn is in plain view and has room for an
-open hand. What order, and which grasps, nobody tells the planner; what a scan does not see it must take for solid all the same.
+By construction it can be sorted: by the true bodies there is an order in which each part in its turn is in plain view, with room for an
+open hand at two upright faces, for no finger goes under a part that leans, where nobody sees. What order, and which grasps, nobody tells
+the planner; what a scan does not see it must take for solid all the same.
 """
 
 from dataclasses import dataclass, replace
@@ -27,6 +28,7 @@ TRAY_X, TRAY_Y = (0.33, 0.43, 0.53, 0.63), (0.14, 0.23, 0.31)  # the middles of 
 PILE_X, PILE_Y = (0.31, 0.65), (-0.21, 0.06)  # where the parts come to lie
 SLACK_M = 0.015  # a place is that much wide and deep about its middle
 RAIL = (0.004, 0.008)  # thickness and height [m] of the tray's rails
+UPRIGHT = np.sin(np.deg2rad(5.0))  # how far off upright the faces that can be grasped are
 VISIBLE = 0.6  # share of a part that shows when its turn comes
 ATTEMPTS = 200
 
@@ -101,7 +103,9 @@ def _sortable(workcell: Workcell, hand: Hand, bodies: tuple[SolidBody, ...]) -> 
     fixed, left = fixed_bodies(workcell), bodies
     while left:
         standing = (*fixed, *left)
-        free = (body for body in left if graspable(hand, body, standing) and visible_share(workcell.finder, standing, body) >= VISIBLE)
+        free = (
+            body for body in left if graspable(hand, body, standing, UPRIGHT) and visible_share(workcell.finder, standing, body) >= VISIBLE
+        )
         taken = next(free, None)
         if taken is None:
             return False

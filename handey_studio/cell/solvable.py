@@ -26,7 +26,6 @@ from handey_studio.grasping import (
     grasp_placement_table,
     hand_in_plane,
     legal_rotations,
-    opening_around,
     sequences,
     stable_placements,
     tilts_at,
@@ -124,7 +123,7 @@ def _kept_up(
     groups, _ = grasp_groups(model, robot.hand)
     for g in rng.permutation(len(groups))[:24]:
         rotations = legal_rotations(groups[g], ends[0], ends[1])
-        opening = opening_around(robot.hand, groups[g].grasp_class.width)
+        opening = groups[g].opening(robot.hand)
         for angle in rotations.best(2):
             if rotations.tilts(np.array([angle])).max() > options.most_tilt:
                 continue

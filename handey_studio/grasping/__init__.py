@@ -9,7 +9,6 @@ from handey_studio.grasping.classes import (
     contact_areas,
     grasp_classes,
     hand_in_plane,
-    opening_around,
 )
 from handey_studio.grasping.free_patches import Patch, PatchOptions, Wanted, free_patches
 from handey_studio.grasping.grasp_motion import MotionOptions, plan_grasp_motion, plan_lowering, plan_retreat
@@ -84,7 +83,6 @@ __all__ = [
     "hand_outline",
     "legal_at",
     "legal_rotations",
-    "opening_around",
     "outline_with",
     "pad_wrenches",
     "plan_approach",

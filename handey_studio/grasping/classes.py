@@ -95,11 +95,6 @@ def hand_in_plane(point: NDArray, angle: float, side: int) -> NDArray:
     return T
 
 
-def opening_around(hand: Hand, width: float) -> float:
-    """How far [m] the hand opens to go around a part of that width."""
-    return min(width + 2 * OPEN_CLEARANCE_M, hand.opening_max)
-
-
 def contact_area(grasp_class: GraspClass, hand: Hand, point: NDArray, angle: float) -> float:
     """Area [m²] of contact when the fingertips are at a point (y, z) of the grasp plane: see `contact_areas`."""
     return float(contact_areas(grasp_class, hand, np.asarray(point)[None], np.array([angle]))[0])

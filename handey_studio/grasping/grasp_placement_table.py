@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.transforms import inverse
-from handey_studio.grasping.classes import contact_areas, hand_in_plane, opening_around
+from handey_studio.grasping.classes import contact_areas, hand_in_plane
 from handey_studio.grasping.groups import GraspGroup, grasp_groups
 from handey_studio.grasping.placements import Placement, PlacementOptions, stable_placements
 from handey_studio.grasping.rotations import HAND_MARGIN_M, GraspEnd, tilt
@@ -102,7 +102,7 @@ def grasp_placement_table(part: Part, hand: Hand, options: TableOptions = TableO
     offsets = np.linspace(-options.reach, options.reach, 2 * options.steps + 1)
     columns = [(g, group.angle + offset) for g, group in enumerate(groups) for offset in offsets]
     Ts_part_hand = np.array([_hand_at(groups[g], angle) for g, angle in columns]).reshape(-1, 4, 4)
-    openings = np.array([opening_around(hand, groups[g].grasp_class.width) for g, _ in columns])
+    openings = np.array([groups[g].opening(hand) for g, _ in columns])
     heights, tilts = _above_plane(Ts_plane_part, Ts_part_hand, hand, openings)
     return GraspPlacementTable(
         part,

@@ -1,6 +1,6 @@
 """Approach groups (Handey 1987 §5.1, Figure 6): within a grasp class, the approaches that cross the same edge of the grasp face first."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -8,7 +8,7 @@ import shapely
 from numpy.typing import NDArray
 
 from handey_studio.base import Entry, Ledger, Value, frozen_array
-from handey_studio.grasping.classes import GraspClass, contact_areas, grasp_classes
+from handey_studio.grasping.classes import OPEN_CLEARANCE_M, OPEN_CLEARANCE_MIN_M, GraspClass, contact_areas, grasp_classes
 from handey_studio.world import Hand, Part
 
 SHARES = (0.5, 0.25, 0.75)  # where along the first edge, or along a grasped edge, the finger may enter
@@ -26,7 +26,7 @@ class GraspGroup(Value):
 
     `edge` (2, 2) [m] its ends in the plane's y, z; `point` (2,) [m] where the fingertips' centre goes; `angle` [rad] of the
     approach across the edge at right angles, in the plane, from y towards z. `share` and `depth` [m] say where along the edge and
-    how far beyond it the point lies.
+    how far beyond it the point lies. The open hand passes the part at `clearance` [m] on each side.
     """
 
     grasp_class: GraspClass
@@ -36,6 +36,7 @@ class GraspGroup(Value):
     angle: float
     share: float
     depth: float
+    clearance: float = OPEN_CLEARANCE_M
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "edge", frozen_array(self.edge))
@@ -45,6 +46,15 @@ class GraspGroup(Value):
     def name(self) -> str:
         where = {0.5: "centre", 0.25: "first quarter", 0.75: "last quarter"}.get(round(self.share, 3), f"{self.share:.0%} along")
         return f"{self.grasp_class.name}, edge {self.edge_number}, {where}, {1e3 * self.depth:.0f} mm deep"
+
+    @property
+    def opened_less(self) -> "GraspGroup | None":
+        """The same for the hand opened as little as goes around the part, where things stand close beside it; None if it is."""
+        return replace(self, clearance=OPEN_CLEARANCE_MIN_M) if self.clearance > OPEN_CLEARANCE_MIN_M else None
+
+    def opening(self, hand: Hand) -> float:
+        """How far [m] the hand opens to go around the part."""
+        return min(self.grasp_class.width + 2 * self.clearance, hand.opening_max)
 
 
 @lru_cache(maxsize=32)

@@ -9,7 +9,6 @@ from shapely.geometry.base import BaseGeometry
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.geometry.transforms import apply, inverse
-from handey_studio.grasping.classes import opening_around
 from handey_studio.grasping.groups import GraspGroup
 from handey_studio.grasping.plane_columns import BIN_M, Strips, depth_columns, filled_strips
 from handey_studio.grasping.plane_obstacles import Volumes, clipped, hand_volumes, hull
@@ -32,9 +31,9 @@ class PlaneOutline(Value):
 
 def plane_outlines(group: GraspGroup, pickup: GraspEnd, putdown: GraspEnd) -> tuple[PlaneOutline, ...]:
     """Outlines of everything within the hand's reach at both ends, in the group's grasp plane; the part itself is left out."""
-    hand, width = pickup.world.robot.hand, group.grasp_class.width
-    opening = opening_around(hand, width)
-    volumes, names = hand_volumes(hand, width, opening, HAND_MARGIN_M), tuple(hand.boxes(opening))
+    hand = pickup.world.robot.hand
+    opening = group.opening(hand)
+    volumes, names = hand_volumes(hand, group.grasp_class.width, opening, HAND_MARGIN_M), tuple(hand.boxes(opening))
     found: list[PlaneOutline] = []
     for name, end in zip(ENDS, (pickup, putdown), strict=True):
         for v, volume in enumerate(names):

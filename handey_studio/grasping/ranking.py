@@ -8,7 +8,7 @@ import shapely
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import inverse
-from handey_studio.grasping.classes import contact_area, finger_pads, opening_around
+from handey_studio.grasping.classes import contact_area, finger_pads
 from handey_studio.grasping.groups import GraspGroup
 from handey_studio.grasping.rotations import GraspEnd, LegalRotations, angle_range
 from handey_studio.world import Hand, Part
@@ -78,7 +78,7 @@ def rank_terms(
     chosen = angle if angle is not None else best[0] if best else group.angle
     terms = rank_terms(group, pickup, putdown)
     hand = pickup.world.robot.hand
-    opening = opening_around(hand, group.grasp_class.width)
+    opening = group.opening(hand)
     ends = [(end, end.hand_pose(group, chosen)) for end in (pickup, putdown)]
     clearance = min(collision_model(end.world).hand_contact(T, opening, limit=ENOUGH_CLEARANCE_M).distance for end, T in ends)
     contact = contact_area(group.grasp_class, hand, group.point, chosen) / hand.min_contact_area

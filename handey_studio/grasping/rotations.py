@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.grasping.angle_ranges import Ranges, complement, inside, joined
-from handey_studio.grasping.classes import contact_areas, hand_in_plane, opening_around
+from handey_studio.grasping.classes import contact_areas, hand_in_plane
 from handey_studio.grasping.forbidden_angles import MOST_RANGES
 from handey_studio.grasping.groups import GraspGroup
 from handey_studio.grasping.plane_columns import add_columns, depth_columns
@@ -103,6 +103,11 @@ class LegalRotations(Value):
         """Whether any angle is left."""
         return bool(self.ranges())
 
+    @property
+    def shut_by_bodies(self) -> bool:
+        """Whether what stands at the ends forbids angles, so that less room for the hand may do."""
+        return any(f.body and f.end != "both" for f in self.forbidden)
+
     def ranges(self, end: End = "both") -> Ranges:
         """The free ranges (first, last) [rad] in order, at one end alone or at both together."""
         return complement(
@@ -184,7 +189,7 @@ def legal_rotations(group: GraspGroup, pickup: GraspEnd, putdown: GraspEnd) -> L
     found = LegalRotations(group, *window, tuple(forbidden), np.array([T[2, 1:3] for T in planes]))
     if not found.legal:
         return found  # whatever the scene
-    volumes = hand_volumes(hand, group.grasp_class.width, opening_around(hand, group.grasp_class.width), HAND_MARGIN_M)
+    volumes = hand_volumes(hand, group.grasp_class.width, group.opening(hand), HAND_MARGIN_M)
     for name, end, T in zip(ENDS, (pickup, putdown), planes, strict=True):
         forbidden += [ForbiddenRange(low, high, name, body) for body, low, high in _end_ranges(end, T, group, volumes, window)]
     return replace(found, forbidden=tuple(forbidden))
@@ -208,7 +213,7 @@ def _end_ranges(
 @lru_cache(maxsize=4096)
 def _own_ranges(group: GraspGroup, part: Part, hand: Hand, name: str) -> tuple[ForbiddenRange, ...]:
     """Where the part itself is in the hand's way: the same at both ends, whatever the scene."""
-    volumes = hand_volumes(hand, group.grasp_class.width, opening_around(hand, group.grasp_class.width), HAND_MARGIN_M, ALLOWED_DEPTH_M)
+    volumes = hand_volumes(hand, group.grasp_class.width, group.opening(hand), HAND_MARGIN_M, ALLOWED_DEPTH_M)
     window = (group.angle - REACH_RAD, group.angle + REACH_RAD)
     ranges, counts = np.empty((1, MOST_RANGES, 2)), np.zeros(1, np.int64)
     add_solids(_pieces(part), -1, group.grasp_class.T_part_plane @ _to_point(group), volumes, window, ranges, counts)

@@ -5,8 +5,11 @@ way to a reading elsewhere (the shadow's own slope), and never above the hole's 
 the map with it, and only those; what it stood on stays solid up to the part's underside. A lone reading that stands out of level ground
 no farther than readings err is the ground's own: two that agree are a thing. With them goes the sliver of its own shadow
 that is no wider than fingers need to close on it: they close by force and tell their width, so they feel what nobody saw there.
+At the rim of a part that leans, and in that sliver, what is under it is no higher than what was read beside it: fingers that close on
+its sides reach below them.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,12 +20,14 @@ from scipy import ndimage
 from scipy.spatial import ConvexHull
 
 from handey_studio.geometry import HeightField
-from handey_studio.geometry.transforms import apply, inverse
+from handey_studio.geometry.transforms import apply, inverse, transform
 from handey_studio.sensing.depth_map import SKY_M, DepthMap
 from handey_studio.world import Part, PlacedPart
 
 EXPLAINED_SIGMAS = 4.0  # a reading this many standard deviations from a part's surface is still the part's
 SLIVER_M = 0.006  # between a part's face and an open finger
+RIM_M = 0.0025  # what fingers at a part's side keep off the columns, and how much larger these are made
+BESIDE_M = 0.012  # within which readings tell of a part's rim
 AROUND = 2  # cells to each side that must be level around a lone reading
 
 
@@ -38,8 +43,9 @@ def without_parts(depth_map: DepthMap, columns: HeightField, placed: tuple[Place
     """`columns` after the readings that the placed parts explain have left the map."""
     top = columns.top.copy()
     for part in placed:
-        own, underside = _explained(depth_map, part)
-        top[own] = np.minimum(top[own], underside[own])
+        rows, cols = _around(depth_map, part)
+        own, underside = _explained(_cut(depth_map, rows, cols), part)
+        top[rows, cols][own] = np.minimum(top[rows, cols][own], underside[own])
     return HeightField(top, columns.cell, columns.T_world_range)
 
 
@@ -93,6 +99,23 @@ def _half_spaces(part: Part) -> tuple[NDArray, ...]:
     return tuple(np.unique(np.round(ConvexHull(piece).equations, 12), axis=0) for piece in part.pieces)
 
 
+def _around(depth_map: DepthMap, placed: PlacedPart) -> tuple[slice, slice]:
+    """Rows and columns of the map, from and to, that hold a part and what is beside it."""
+    corners = apply(inverse(depth_map.T_world_range), placed.corners_world)[:, :2] / depth_map.cell
+    wide = (max(explained_tolerance(depth_map), SLIVER_M) + BESIDE_M) / depth_map.cell + 2.0
+    low, high = np.floor(corners.min(axis=0) - wide).astype(int), np.ceil(corners.max(axis=0) + wide).astype(int)
+    ny, nx = depth_map.elevation.shape
+    (i0, j0), (i1, j1) = np.clip(low, 0, (nx, ny)), np.clip(high, 0, (nx, ny))
+    return slice(j0, j1), slice(i0, i1)
+
+
+def _cut(depth_map: DepthMap, rows: slice, cols: slice) -> DepthMap:
+    """A piece of the map, as a map."""
+    T_range_piece = transform(None, (cols.start * depth_map.cell, rows.start * depth_map.cell, 0.0))
+    T_world_piece = depth_map.T_world_range @ T_range_piece
+    return replace(depth_map, elevation=depth_map.elevation[rows, cols], passed=depth_map.passed[rows, cols], T_world_range=T_world_piece)
+
+
 def _explained(depth_map: DepthMap, placed: PlacedPart) -> tuple[NDArray, NDArray]:
     """Which cells the part explains (ny, nx), and its underside [m] there in the range frame."""
     tolerance = explained_tolerance(depth_map)
@@ -115,7 +138,19 @@ def _explained(depth_map: DepthMap, placed: PlacedPart) -> tuple[NDArray, NDArra
     top = float(apply(T_range_part, placed.part.solid.vertices)[:, 2].max())
     sliver = np.where(depth_map.passed <= top + tolerance, SLIVER_M, tolerance)  # light that passed above the part was not its shadow's
     own &= ~(np.isnan(depth_map.elevation) & (gap * depth_map.cell > np.maximum(sliver, tolerance)))
-    return own, underside
+    return own, np.minimum(underside, _beside(depth_map, own, footprint))
+
+
+def _beside(depth_map: DepthMap, own: NDArray, footprint: NDArray) -> NDArray:
+    """What was read beside the part (ny, nx) [m] where its rim and its sliver are; infinity elsewhere, or if nothing was read near by."""
+    seen = ~own & ~np.isnan(depth_map.elevation)
+    if not seen.any():
+        return np.full(seen.shape, np.inf)
+    found: Any = ndimage.distance_transform_edt(~seen, return_indices=True)
+    distance, nearest = found
+    inside: Any = ndimage.distance_transform_edt(footprint)
+    near = (inside * depth_map.cell <= RIM_M) & (distance * depth_map.cell <= BESIDE_M)
+    return np.where(near, depth_map.elevation[nearest[0], nearest[1]], np.inf)
 
 
 def _outside_by(part: Part, points_part: NDArray) -> NDArray:

@@ -23,6 +23,7 @@ from handey_studio.grasping import (
     legal_at,
     rank_terms,
 )
+from handey_studio.task.options import OPENED_LESS
 from handey_studio.task.plan import Carry, GraspChoice, MovePlan, MoveResult
 from handey_studio.task.sense import Scene, believed_world
 from handey_studio.world import Part, PlacedPart, Robot, World
@@ -99,7 +100,7 @@ def fates(entries: Sequence[Entry]) -> dict[str, Entry]:
     """What became of each grasp group that a search looked at, by its name: one that stood somewhere, else why it fell first."""
     found: dict[str, Entry] = {}
     for entry in entries:
-        name = entry.option.split(", symmetry ")[0]
+        name = entry.option.removesuffix(OPENED_LESS).split(", symmetry ")[0]
         if entry.stage == "grasp group" and (name not in found or (entry.reason is None and found[name].reason is not None)):
             found[name] = entry
     return found

@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Value, frozen_array
 from handey_studio.geometry.transforms import from_xyz_rpy
-from handey_studio.grasping import GraspEnd, GraspGroup, grasp_groups, opening_around, rank_terms, topples_by
+from handey_studio.grasping import GraspEnd, GraspGroup, grasp_groups, rank_terms, topples_by
 from handey_studio.world import PlacedPart, World
 from handey_studio.world.collision import ALLOWED_DEPTH_M
 from handey_studio.world.support import MAX_GAP_M, TOUCHING_M, Neighbour, neighbours
 
 Pairs = tuple[tuple[str, str], ...]
 
+OPENED_LESS = ", opened less"  # ends the names of such options
+OPENED_LESS_COST = 0.3  # [rad of tilt] what it is worth to pass the part at a distance
 CLIMB_M = (0.004, 0.012, 0.03, 0.06)  # the part alone must be free at these heights above both its places
 
 
@@ -67,12 +69,17 @@ class Option(Value):
     @property
     def opening(self) -> float:
         """How far [m] the hand opens to go around the part."""
-        return opening_around(self.goal.at_start.robot.hand, self.group.grasp_class.width)
+        return self.group.opening(self.goal.at_start.robot.hand)
 
     @property
     def name(self) -> str:
         turned = f", symmetry {self.symmetry}" if self.symmetry else ""
-        return f"{self.group.name}{turned}"
+        return f"{self.group.name}{turned}{'' if self.group.opened_less else OPENED_LESS}"
+
+    def opened_less(self) -> "Option | None":
+        """The same with the hand opened as little as goes around the part; None if it is."""
+        group = self.group.opened_less
+        return replace(self, group=group, cost=self.cost + OPENED_LESS_COST) if group else None
 
 
 def check_goal(

@@ -3,6 +3,7 @@
 from collections import Counter, defaultdict
 
 from handey_studio.base import Entry, Ledger, describe, measured
+from handey_studio.task.options import OPENED_LESS
 from handey_studio.world import World
 
 MOST_REASONS = 3  # of the grasp groups that are told, the commonest first
@@ -35,7 +36,8 @@ def why_no_goal(world: World, candidates: int, part: str, to: str, entries: tupl
     fallen = [entry for entry in entries if entry.reason and entry.stage in ("destination", "area")]
     if not fallen:
         return f'nothing to put it on: "{to}" needs another part than the one that moves; found: {located}'
-    others = f"; {len(fallen) - 1} other readings of the command fell too" if len(fallen) > 1 else ""
+    more = len(fallen) - 1
+    others = f"; {more} other reading{'s' if more > 1 else ''} of the command fell too" if more else ""
     return describe(fallen[0]) + others
 
 
@@ -43,7 +45,8 @@ def why_no_plan(entries: tuple[Entry, ...]) -> str:
     """Why no option was left: the commonest reasons and what met what, whether a regrasp would be the way, and what was not looked at."""
     groups = [entry for entry in entries if entry.stage == "grasp group" and entry.reason]
     if groups:
-        words = f"none of {len(groups)} grasp groups works: {_commonest(groups, entries)}{_why_no_detour(entries)}"
+        count = len({entry.option.removesuffix(OPENED_LESS) for entry in groups})
+        words = f"none of {count} grasp groups works: {_commonest(groups, entries)}{_why_no_detour(entries)}"
     else:
         words = f"the hand cannot grasp this part: {_why_no_groups(entries)}"
     return words + "".join(f"; {entry.option} were {describe(entry)}" for entry in entries if entry.reason == EFFORT_SPENT)

@@ -184,6 +184,9 @@ class OptionSearch:
             self._shut[here] = rotations
         if not angles:
             fall_illegal(option, rotations, entry, self.ledger)
+            tighter = option.opened_less() if rotations.shut_by_bodies else None
+            if tighter is not None:
+                self._push(node._replace(what=tighter, cost=node.cost + tighter.cost - option.cost))
         for angle in angles:
             cost = node.cost - option.cost + rank_terms(option.group, option.pickup, option.putdown, rotations, angle).cost
             self._push(Node(APPROACH, node.route, (option, rotations, angle), cost, entry))

@@ -9,7 +9,7 @@ from shapely import affinity
 
 from handey_studio.geometry import HeightField
 from handey_studio.geometry.transforms import from_xyz_rpy, inverse
-from handey_studio.grasping import HAND_MARGIN_M, GraspEnd, contact_area, grasp_groups, hand_in_plane, legal_rotations, opening_around
+from handey_studio.grasping import HAND_MARGIN_M, GraspEnd, contact_area, grasp_groups, hand_in_plane, legal_rotations
 from handey_studio.grasping.angle_ranges import complement, joined
 from handey_studio.grasping.forbidden_angles import MOST_RANGES, insert, polygon_ranges
 from handey_studio.grasping.plane_obstacles import clipped, hull
@@ -125,7 +125,7 @@ def test_every_angle_that_is_left_is_free_and_what_is_forbidden_is_near_somethin
     ends = draw_end(rng, part), draw_end(rng, part)
     groups, _ = grasp_groups(part, HAND)
     group = groups[rng.integers(len(groups))]
-    width, opening = group.grasp_class.width, opening_around(HAND, group.grasp_class.width)
+    width, opening = group.grasp_class.width, group.opening(HAND)
     rotations = legal_rotations(group, *ends)
     for name, end in zip(("pickup", "putdown"), ends, strict=True):
         free, slack = rotations.ranges(name), 0.0008 + (0.005 if end.world.terrain else 0.0)

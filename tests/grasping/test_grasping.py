@@ -8,7 +8,6 @@ from handey_studio.grasping import (
     fill_grasp_plane,
     grasp_groups,
     hand_in_plane,
-    opening_around,
     plan_approach,
 )
 from handey_studio.grasping.bump_lines import hand_rectangles
@@ -63,7 +62,7 @@ def filled_near(plane, volume, points):
 
 def approach(world, part, T_world_part, group):
     T_world_plane = T_world_part @ group.grasp_class.T_part_plane
-    opening = opening_around(HAND, group.grasp_class.width)
+    opening = group.opening(HAND)
     plane = fill_grasp_plane(world, T_world_plane, group.point, HAND, opening)
     along = np.array([np.cos(group.angle), np.sin(group.angle)])
     start = np.append(group.point - (0.08 + group.depth) * along, group.angle)

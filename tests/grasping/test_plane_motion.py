@@ -19,7 +19,6 @@ from handey_studio.grasping import (
     grasp_groups,
     hand_in_plane,
     hand_outline,
-    opening_around,
     outline_with,
     plan_grasp_motion,
     plan_lowering,
@@ -290,7 +289,7 @@ def test_a_way_in_the_plane_is_a_way_in_the_world(seed):
     world, placed = cluttered(seed)
     model, tried = collision_model(world), 0
     for group in grasp_groups(BRICK, HAND)[0]:
-        opening, T_world_plane = opening_around(HAND, group.grasp_class.width), placed.T_world_part @ group.grasp_class.T_part_plane
+        opening, T_world_plane = group.opening(HAND), placed.T_world_part @ group.grasp_class.T_part_plane
         T_world_hand = T_world_plane @ hand_in_plane(group.point, group.angle, 1)
         if tried == 4 or T_world_hand[2, 2] > -0.3 or not model.hand_contact(T_world_hand, opening, limit=0.001).distance >= 0.001:
             continue

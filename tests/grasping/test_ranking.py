@@ -14,7 +14,6 @@ from handey_studio.grasping import (
     grasp_groups,
     hand_in_plane,
     legal_rotations,
-    opening_around,
     plane_outlines,
     rank_terms,
     within_reach,
@@ -46,7 +45,7 @@ def test_terms_are_measured_where_the_hand_will_be():
         (angle,) = rotations.best(1)
         poses = [e.hand_pose(group, angle) for e in (here, there)]
         assert np.isclose(terms.tilt, sum(np.arccos(np.clip(-pose[2, 2], -1, 1)) for pose in poses))
-        opening = opening_around(HAND, group.grasp_class.width)
+        opening = group.opening(HAND)
         free = min(collision_model(e.world).hand_contact(pose, opening).distance for e, pose in zip((here, there), poses, strict=True))
         assert terms.clearance is not None and np.isclose(terms.clearance, min(free, terms.clearance)) and terms.clearance >= 0.001
         assert terms.contact >= 1 and terms.off_centre >= 0
@@ -112,7 +111,7 @@ def test_outlines_are_what_the_hand_meets():
         assert "it" not in {outline.body for outline in outlines}
         for e, name, body, points in ((here, "pickup", "wall", in_wall), (there, "putdown", "depth map", in_columns)):
             local = apply(inverse(e.T_world_part @ group.grasp_class.T_part_plane), points)
-            half = opening_around(HAND, group.grasp_class.width) / 2
+            half = group.opening(HAND) / 2
             inside = local[(local[:, 0] > half) & (local[:, 0] < half + HAND.finger_thickness)][:, 1:]
             inside = inside[np.linalg.norm(inside - group.point, axis=1) < HAND.finger_length]
             seen = [shapely.Polygon(o.corners) for o in outlines if (o.end, o.body, o.volume) == (name, body, "finger_right")]

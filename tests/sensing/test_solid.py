@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -86,6 +87,22 @@ def test_what_a_tilted_part_stands_on_stays_solid_up_to_its_underside():
     centre = columns[50, 50]
     assert lowest - 1e-6 <= centre <= 0.05, (lowest, centre)
     assert dm.view().depth.shape == (N, N)
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.05])
+def test_under_the_rim_of_a_part_that_leans_nothing_is_higher_than_what_was_read_beside_it(beside):
+    part, T = Part("brick", box((0.05, 0.04, 0.03))), from_xyz_rpy((0.1, 0.1, 0.08), (0.0, 0.3, 0.0))
+    j, i = np.mgrid[:N, :N]
+    x, y = (i + 0.5) * CELL - 0.1, (j + 0.5) * CELL - 0.1
+    over = (np.abs(x) < 0.018) & (np.abs(y) < 0.02)
+    probe = PlacedPart("brick#1", part, T)
+    elevation = np.where(over, 0.08 + (0.015 - np.sin(0.3) * x) / np.cos(0.3), 0.0)
+    elevation[(np.abs(y) >= 0.02) & (np.abs(y) < 0.05)] = beside
+    dm = depth_map(elevation)
+    columns = without_parts(dm, solid_columns(dm), (probe,)).top
+    rim = over & (np.abs(x) < 0.01) & (np.abs(y) > 0.019)
+    assert np.allclose(columns[rim], beside, atol=1e-6)
+    assert columns[over & (np.abs(x) < 0.01) & (np.abs(y) < 0.01)].min() > 0.055, "but what is under its middle may be as high as the part"
 
 
 @settings(max_examples=40, deadline=None)

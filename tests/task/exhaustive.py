@@ -17,7 +17,7 @@ from handey_studio.cell.penetration import overlap, polytope, polytopes_of
 from handey_studio.geometry.transforms import apply
 from handey_studio.world import FINGERS, Part, Robot, arm_of
 
-OPENED_M = 0.012  # beyond the part's width, as the planner opens the hand
+OPENED_M = 0.006  # beyond the part's width: the least that the planner opens the hand, and the margin that it keeps on each side
 SPACING_M, PAD_M = 0.008, 0.002
 AROUND = np.deg2rad(np.arange(0.0, 360.0, 15.0))
 CLEAR_M, LIMIT_RAD = 0.0011, np.deg2rad(3.0)
