@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from handey_studio.base import BadInput, Entry, Progress, rejected_counts
     from handey_studio.localization import LocateOptions, localize
-    from handey_studio.sensing.files import read_depth
+    from handey_studio.sensing.reading.files import read_depth
     from handey_studio.sensing.support import support_plane
     from handey_studio.session import Session, find_session, new_session, read_session, write_session
     from handey_studio.session.run import cell_of, station_of

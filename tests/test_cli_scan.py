@@ -9,10 +9,10 @@ import pytest
 from handey_studio import cli
 from handey_studio.cell.recorded import read_depth_map
 from handey_studio.geometry.transforms import apply, inverse, transform
-from handey_studio.sensing.files import read_depth
-from handey_studio.sensing.instrument import Instrument
-from handey_studio.sensing.instrument_file import read_instrument, write_instrument
-from handey_studio.sensing.stripe_camera import StripeCamera, camera_looking_at
+from handey_studio.sensing.reading.files import read_depth
+from handey_studio.sensing.stripes.instrument import Instrument
+from handey_studio.sensing.stripes.instrument_file import read_instrument, write_instrument
+from handey_studio.sensing.stripes.stripe_camera import StripeCamera, camera_looking_at
 from tests.sensing.stripe_images import noisy, stripe
 
 LOOK = camera_looking_at((-0.3, 0.0, 0.5), (0.0, 0.0, 0.0))

@@ -15,8 +15,8 @@ from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.session import Session
 from handey_studio.session.calibrating import calibrated, cell_with_cube, misplaced
 from handey_studio.session.run import station_of
-from handey_studio.task.calibrate import CalibrateOptions, RangeCalibration, calibrate_range
-from handey_studio.task.calibration_report import calibration_lines
+from handey_studio.task.calibrating.calibrate import CalibrateOptions, RangeCalibration, calibrate_range
+from handey_studio.task.calibrating.report import calibration_lines
 from handey_studio.world import Library
 
 MOST_OFF_M = np.array([0.009, 0.009, 0.0003])  # of a misplacement that is drawn by chance: a table that seems to rise forbids every MOVE

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from handey_studio.app import html, palette
 from handey_studio.app.palette import css
-from handey_studio.app.svg import FRAME, picture_uri
+from handey_studio.app.pictures.svg import FRAME, picture_uri
 from handey_studio.motion import CSpaceSummary
 
 BLOCKED, FREE = palette.FILLED, (251, 252, 253)

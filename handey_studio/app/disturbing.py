@@ -12,7 +12,7 @@ from handey_studio.cell.faults import Fault
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.session import Session
 from handey_studio.session.destination import destination_pose
-from handey_studio.task.acting import fingers_only
+from handey_studio.task.acting.motions import fingers_only
 from handey_studio.task.plan import MovePlan, Step
 
 MAX_FAULTS = 12

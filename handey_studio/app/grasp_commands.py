@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.app.grasp_look import GraspLook
+from handey_studio.app.pictures.table import layout_of
 from handey_studio.app.state import State
-from handey_studio.app.svg_table import layout_of
 from handey_studio.geometry.transforms import apply, transform
 from handey_studio.grasping import GOAL, START
 from handey_studio.session.handling import row_of

@@ -10,7 +10,7 @@ from handey_studio.app.playback import LookAtAttempt
 from handey_studio.app.state import State
 from handey_studio.session import Told, replay_of, seconds_of
 from handey_studio.session.ledger_tree import ROOT
-from handey_studio.task.performance import Check, Incident, Recovery
+from handey_studio.task.acting.performance import Check, Incident, Recovery
 from handey_studio.task.plan import MoveResult
 from handey_studio.world import Robot
 

@@ -17,8 +17,8 @@ from handey_studio.session import Moment, Replay, Session, Told, attempts_of, re
 from handey_studio.session.handling import Handling
 from handey_studio.session.ledger_tree import ROOT
 from handey_studio.session.sequence import last_run
-from handey_studio.task.calibrate import RangeCalibration
-from handey_studio.task.performance import Performance
+from handey_studio.task.acting.performance import Performance
+from handey_studio.task.calibrating.calibrate import RangeCalibration
 from handey_studio.task.plan import Carry, MoveCommand, MovePlan
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Robot

@@ -10,7 +10,7 @@ from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.gripping import close_fingers, span_between
 from handey_studio.cell.guarded import first_touch, motion_at
 from handey_studio.cell.motions import check_motion, check_opening
-from handey_studio.cell.physics import settle
+from handey_studio.cell.physics.settling import settle
 from handey_studio.cell.protocol import TOUCH_N, Compliance, Moved, Wrench
 from handey_studio.cell.recording import Event, Recording, as_commanded
 from handey_studio.cell.truth import TrueState, true_bodies

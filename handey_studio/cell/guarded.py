@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.penetration import Polytope, overlap, polytope, polytopes_of
+from handey_studio.cell.check.penetration import Polytope, overlap, polytope, polytopes_of
 from handey_studio.geometry.transforms import apply
 from handey_studio.motion import Trajectory
 from handey_studio.world.arm import Arm, hand_hulls

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.stripes import LIT_M, Surfaces
-from handey_studio.sensing.laser_planes import distances
-from handey_studio.sensing.stripe_camera import StripeCamera
+from handey_studio.sensing.stripes.laser_planes import distances
+from handey_studio.sensing.stripes.stripe_camera import StripeCamera
 
 LASERS = {"red": (0.03, 0.06, 1.0), "green": (0.08, 1.0, 0.10), "grey": (1.0, 1.0, 1.0)}  # what each channel sees: blue, green, red
 ROOM = (0.85, 1.0, 0.95)

@@ -19,7 +19,7 @@ from handey_studio.cell.recording import as_commanded
 from handey_studio.geometry.transforms import is_rigid
 from handey_studio.motion import Trajectory
 from handey_studio.sensing.depth_map import DepthMap
-from handey_studio.sensing.files import read_depth
+from handey_studio.sensing.reading.files import read_depth
 from handey_studio.sensing.support import support_planes
 from handey_studio.sensing.view_map import depth_map_of
 from handey_studio.world.robot import Robot

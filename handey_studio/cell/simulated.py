@@ -1,7 +1,7 @@
 """The simulated cell of a workcell: with forces or without, as its setup says."""
 
 from handey_studio.cell.geometric import GeometricCell
-from handey_studio.cell.physical import PhysicalCell
+from handey_studio.cell.physics.physical import PhysicalCell
 from handey_studio.cell.workcell import Workcell
 from handey_studio.world.library import Library
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from handey_studio.cell.bodies import SolidBody
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.sensing.depth_map import DepthMap
-from handey_studio.sensing.range_finder import RangeFinder, fuse, triangulate
+from handey_studio.sensing.stripes.range_finder import RangeFinder, fuse, triangulate
 
 GRAZING = 0.2  # least cosine between a ray and the surface's normal that still gives a peak: steeper than 78° is lost
 LIT_M = 2e-4  # a shadow ray that ends this close to the point has reached it; above the ray caster's single precision

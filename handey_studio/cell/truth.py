@@ -11,7 +11,7 @@ from handey_studio.base.errors import unknown_name
 from handey_studio.cell.bodies import SolidBody, check_names, fixed_bodies, solid_body
 from handey_studio.cell.faults import Fault, check_faults
 from handey_studio.cell.in_view import arm_bodies
-from handey_studio.cell.physics import settle
+from handey_studio.cell.physics.settling import settle
 from handey_studio.cell.stripes import photograph
 from handey_studio.cell.workcell import SimulatedSetup, Workcell
 from handey_studio.geometry import box

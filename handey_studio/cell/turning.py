@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody, check_names, fixed_bodies, solid_body
-from handey_studio.cell.physics import settle
+from handey_studio.cell.physics.settling import settle
 from handey_studio.cell.workcell import SimulatedSetup, Workcell
 from handey_studio.geometry.transforms import rotation_about, transform
 from handey_studio.world import Library

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array
 from handey_studio.cell.faults import Fault
-from handey_studio.sensing.range_finder import RangeFinder
+from handey_studio.sensing.stripes.range_finder import RangeFinder
 from handey_studio.world.world import DEFAULT_FREE_SPACE, Block
 
 

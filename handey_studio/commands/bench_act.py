@@ -22,7 +22,7 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.session.bench_kit import bench_kit
-    from handey_studio.task.bench_act import Trial, bench_act, bench_act_faults
+    from handey_studio.task.bench.act import Trial, bench_act, bench_act_faults
     from handey_studio.world import Library
 
     check_output(given.json)
@@ -36,7 +36,7 @@ def run(given: argparse.Namespace) -> int:
 
 def kinds(given: str | None) -> tuple[str, ...]:
     """The kinds of faults that were asked for. Raises BadInput for one that is not known."""
-    from handey_studio.task.bench_faults import FAULTS
+    from handey_studio.task.bench.faults import FAULTS
 
     wanted = FAULTS if given == "all" else tuple(given.split(",")) if given else ()
     unknown = sorted(set(wanted) - set(FAULTS))

@@ -30,7 +30,7 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.task.bench_locate import run_bench
+    from handey_studio.task.bench.locate import run_bench
     from handey_studio.world import Library
 
     for output in (given.json, given.plot):

@@ -22,7 +22,7 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.task.bench_motion.run import run_bench
+    from handey_studio.task.bench.motion.run import run_bench
     from handey_studio.world import Library
 
     for output in (given.json, given.plot):

@@ -22,7 +22,7 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.task.bench_moves import bench_moves
+    from handey_studio.task.bench.moves import bench_moves
     from handey_studio.world import Library
 
     check_output(given.json)

@@ -18,8 +18,8 @@ def add_arguments(bench: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.task.bench_motion.space_cells import check_cells
-    from handey_studio.task.bench_motion.space_times import cold_start, measure_spaces
+    from handey_studio.task.bench.motion.space_cells import check_cells
+    from handey_studio.task.bench.motion.space_times import cold_start, measure_spaces
     from handey_studio.world import Library
 
     check_output(given.json)

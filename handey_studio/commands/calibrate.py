@@ -33,8 +33,8 @@ def run(given: argparse.Namespace) -> int:
     from handey_studio.session import find_session, read_session, write_session
     from handey_studio.session.calibrating import calibrated, cell_with_cube, misplaced, really_at
     from handey_studio.session.run import station_of
-    from handey_studio.task.calibrate import CalibrateOptions, calibrate_range
-    from handey_studio.task.calibration_report import calibration_lines, calibration_report, truth_line
+    from handey_studio.task.calibrating.calibrate import CalibrateOptions, calibrate_range
+    from handey_studio.task.calibrating.report import calibration_lines, calibration_report, truth_line
     from handey_studio.world import Library
 
     for output in (given.json, given.save, given.save_before):

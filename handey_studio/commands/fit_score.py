@@ -21,7 +21,7 @@ def add_arguments(fit: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.task.bench_locate.fit_score import run_fit, toml
+    from handey_studio.task.bench.locate.fit_score import run_fit, toml
     from handey_studio.world import Library
 
     for output in (given.out, given.json):

@@ -34,8 +34,8 @@ def add_arguments(locate: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     from handey_studio.localization import LocateOptions, localize
     from handey_studio.localization.report import locate_report
-    from handey_studio.sensing.files import read_depth
-    from handey_studio.sensing.report import seen_report
+    from handey_studio.sensing.reading.files import read_depth
+    from handey_studio.sensing.reading.report import seen_report
     from handey_studio.sensing.support import support_planes
     from handey_studio.world import Library
 

@@ -53,7 +53,7 @@ def run(given: argparse.Namespace) -> int:
 
 
 def _summary(name: str, built: "Built") -> str:
-    from handey_studio.modeling.suggest_report import aligned_box
+    from handey_studio.modeling.suggesting.report import aligned_box
 
     fallen = sum(step.reason is not None for step in built.steps)
     steps = f"{len(built.steps)} steps, {fallen} not done" if fallen else f"{len(built.steps)} steps, all done"

@@ -29,9 +29,9 @@ def add_arguments(suggest: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.modeling.scans import scan_of_reading
-    from handey_studio.modeling.suggest_report import suggested
-    from handey_studio.sensing.files import read_depth
-    from handey_studio.sensing.report import seen_report
+    from handey_studio.modeling.suggesting.report import suggested
+    from handey_studio.sensing.reading.files import read_depth
+    from handey_studio.sensing.reading.report import seen_report
 
     for output in (given.json, given.out):
         check_output(output)

@@ -37,10 +37,10 @@ def add_arguments(scan: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     from handey_studio.cell.recorded import write_depth_map
     from handey_studio.geometry.transforms import apply, transform
-    from handey_studio.sensing.instrument_file import read_instrument
-    from handey_studio.sensing.scan import ScanOptions, depth_map_of, scan_folder
-    from handey_studio.sensing.scan_files import scan_view, write_cloud, write_view
-    from handey_studio.sensing.scan_report import scan_lines, scan_report
+    from handey_studio.sensing.stripes.instrument_file import read_instrument
+    from handey_studio.sensing.stripes.scan import ScanOptions, depth_map_of, scan_folder
+    from handey_studio.sensing.stripes.scan_files import scan_view, write_cloud, write_view
+    from handey_studio.sensing.stripes.scan_report import scan_lines, scan_report
 
     for output in (given.cloud, given.depth, given.json):
         check_output(output)

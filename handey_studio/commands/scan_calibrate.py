@@ -29,10 +29,10 @@ def add_arguments(calibrate: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    from handey_studio.sensing.board import Board
-    from handey_studio.sensing.calibrate import CalibrateOptions, calibrate
-    from handey_studio.sensing.instrument_file import read_instrument, write_instrument
-    from handey_studio.sensing.scan_report import calibration_lines, calibration_report
+    from handey_studio.sensing.stripes.board import Board
+    from handey_studio.sensing.stripes.calibrate import CalibrateOptions, calibrate
+    from handey_studio.sensing.stripes.instrument_file import read_instrument, write_instrument
+    from handey_studio.sensing.stripes.scan_report import calibration_lines, calibration_report
 
     check_output(given.out)
     board = Board(given.board[0], given.board[1], 1e-3 * given.square_mm, given.pattern)

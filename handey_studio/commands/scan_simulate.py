@@ -27,7 +27,7 @@ def add_arguments(simulate: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     from handey_studio.cell.photographs import Exposure
-    from handey_studio.cell.scan_folders import FolderOptions, moved_steps, write_stage_folder, write_sweep_folder
+    from handey_studio.cell.scenes.scan_folders import FolderOptions, moved_steps, write_stage_folder, write_sweep_folder
     from handey_studio.session import find_session, read_session
     from handey_studio.session.run import cell_of
     from handey_studio.world import Library

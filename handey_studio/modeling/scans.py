@@ -8,7 +8,7 @@ import numpy as np
 from handey_studio.base import BadInput, Value
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.sensing.depth_view import DepthView
-from handey_studio.sensing.files import DepthReading, read_depth
+from handey_studio.sensing.reading.files import DepthReading, read_depth
 from handey_studio.sensing.support import support_plane
 
 CELL_SCAN = "range finder"  # the source of the cell's own scans

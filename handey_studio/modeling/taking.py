@@ -2,9 +2,9 @@
 
 from handey_studio.base import BadInput
 from handey_studio.modeling.operations import AlignScan, TakeSuggestion
+from handey_studio.modeling.picking.snap import Snap
 from handey_studio.modeling.references import CornerAt, EdgeAt, FaceAt, Reference
-from handey_studio.modeling.snap import Snap
-from handey_studio.modeling.suggestion import Alignment, Suggestion
+from handey_studio.modeling.suggesting.suggestion import Alignment, Suggestion
 
 
 def reference_of(snap: Snap) -> Reference:

@@ -7,14 +7,14 @@ from functools import partial
 from typing import Any
 
 from handey_studio.base import BadInput
-from handey_studio.cell.kits import kit
+from handey_studio.cell.scenes.kits import kit
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.session.run import cell_of
 from handey_studio.session.sequence import run_list, states_of
 from handey_studio.session.session import Session, new_session
 from handey_studio.task import MoveCommand
-from handey_studio.task.bench_act import Trial
-from handey_studio.task.shared_out import shared_out
+from handey_studio.task.bench.act import Trial
+from handey_studio.task.bench.shared_out import shared_out
 from handey_studio.world import Library
 
 ROUNDS = 3  # commands that failed are run again when the others are over: what lay on the part may be gone

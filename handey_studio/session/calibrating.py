@@ -9,7 +9,7 @@ from handey_studio.cell.simulated import SimulatedCell, simulated_cell
 from handey_studio.cell.workcell import SimulatedSetup, TrueBody
 from handey_studio.geometry.transforms import inverse, transform
 from handey_studio.session.session import Session
-from handey_studio.task.calibrate import CUBE, cube_in_hand
+from handey_studio.task.calibrating.calibrate import CUBE, cube_in_hand
 from handey_studio.world import Library, arm_of
 
 OFF_CENTRE_M = 0.003  # a person puts the cube about so far beside where it is said to be

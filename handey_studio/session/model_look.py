@@ -11,11 +11,11 @@ from handey_studio.base import frozen_array
 from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import apply, transform
 from handey_studio.modeling.draft import Draft
-from handey_studio.modeling.patches import Patches
+from handey_studio.modeling.patches.patch import Patches
+from handey_studio.modeling.picking.snapping import Pickable, pickable
 from handey_studio.modeling.replay import Built, replay
 from handey_studio.modeling.scans import Scan
-from handey_studio.modeling.snapping import Pickable, pickable
-from handey_studio.modeling.suggestion import Alignment
+from handey_studio.modeling.suggesting.suggestion import Alignment
 
 GAP_M = 0.03  # between a scan that is not aligned yet and those beside it
 AROUND_M = 0.05  # so much of the support is shown around what stands on it

@@ -12,7 +12,7 @@ from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import apply, inverse, rotation_about
 from handey_studio.modeling.draft import Draft
 from handey_studio.modeling.operations import TakeSuggestion
-from handey_studio.modeling.patches_finding import patches_of
+from handey_studio.modeling.patches.finding import patches_of
 from handey_studio.modeling.replay import Built, replay
 from handey_studio.modeling.scans import CELL_SCAN, scan_of_map
 from handey_studio.modeling.truth_values import Truth

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from handey_studio.base import Value
 from handey_studio.session.replay import Moment, Replay, Stretch, between
-from handey_studio.task.performance import Performance, Recovery
+from handey_studio.task.acting.performance import Performance, Recovery
 from handey_studio.task.plan import MovePlan, MoveResult
 from handey_studio.world import Robot, arm_of
 

@@ -10,12 +10,12 @@ from handey_studio.geometry import Polyhedron
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.modeling.lookup import face_at
 from handey_studio.modeling.operations import Box, Combine
+from handey_studio.modeling.picking.snap import MODEL, Snap
+from handey_studio.modeling.picking.snapping import Pickable
 from handey_studio.modeling.references import CornerAt, EdgeAt, FaceAt
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.sketch_plane import guides_in_plane, sketch_plane
 from handey_studio.modeling.sketching import Guides
-from handey_studio.modeling.snap import MODEL, Snap
-from handey_studio.modeling.snapping import Pickable
 from handey_studio.modeling.taking import reference_of
 
 IN_PLANE_M = 0.003  # an edge this near to a sketch's plane is in it

@@ -10,7 +10,7 @@ from handey_studio.base import Entry, Value, frozen_array
 from handey_studio.grasping import BumpRun, ForbiddenRange, Grip
 from handey_studio.motion import Certificate, CSpaceSummary
 from handey_studio.sensing.depth_map import DepthMap
-from handey_studio.task.performance import Check, Incident, Performance, Recovery
+from handey_studio.task.acting.performance import Check, Incident, Performance, Recovery
 from handey_studio.world import PlacedPart
 
 StepKind = Literal["free", "approach", "close", "lift", "transfer", "regrasp", "place", "open", "retreat"]

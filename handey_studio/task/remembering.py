@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from handey_studio.geometry.transforms import inverse, pose_difference
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.sensing.drawing import camera_of, rendered_depth
+from handey_studio.task.acting.looking import AGREE_M, LEAST_READINGS, SEEN_SHARE, inner
 from handey_studio.task.destination import base_name
-from handey_studio.task.looking import AGREE_M, LEAST_READINGS, SEEN_SHARE, inner
 from handey_studio.task.sense import Scene
 from handey_studio.world import PlacedPart
 

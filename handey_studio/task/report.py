@@ -7,7 +7,7 @@ import numpy as np
 from handey_studio.base import entry_report, finite, rejected_counts
 from handey_studio.grasping import Grip
 from handey_studio.motion.answer import certificate_report
-from handey_studio.task.performance_report import performance_report
+from handey_studio.task.acting.report import performance_report
 from handey_studio.task.plan import Carry, GraspChoice, MoveResult, Step
 from handey_studio.world import Robot
 

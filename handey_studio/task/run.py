@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from handey_studio.base import Progress, Share, Silent
 from handey_studio.cell.protocol import CannotAct, Cell
-from handey_studio.task.execution import Order, Outcome, carry_out
+from handey_studio.task.acting.execution import Order, Outcome, carry_out
+from handey_studio.task.acting.recover import RecoveryOptions
 from handey_studio.task.move import MoveOptions, check_command
 from handey_studio.task.plan import MoveCommand, MoveResult
 from handey_studio.task.planning import Station, plan_in, sense
-from handey_studio.task.recover import RecoveryOptions
 from handey_studio.task.sense import Scene
 from handey_studio.world import PlacedPart
 

@@ -23,6 +23,7 @@ from handey_studio.app.panels.calibration import found_html, off_words, outcomes
 from handey_studio.app.panels.commands import commands_html
 from handey_studio.app.panels.running import happened_html
 from handey_studio.app.panels.timeline import now_playing
+from handey_studio.app.pictures.plots import cursor, plots_html, plots_of
 from handey_studio.app.playback import LookAtAttempt, Seek, Tick, TogglePlay
 from handey_studio.app.sequence import (
     AddCommand,
@@ -36,7 +37,6 @@ from handey_studio.app.sequence import (
 )
 from handey_studio.app.setting_up import SetAttempts, SetDestination, SetImprove, SetSeed
 from handey_studio.app.state import opened, with_view
-from handey_studio.app.svg_plots import cursor, plots_html, plots_of
 from handey_studio.app.tabs import tabs_with_news
 from handey_studio.base import BadInput
 from handey_studio.cell.workcell import TrueBody
@@ -45,7 +45,7 @@ from handey_studio.sensing.frame_fit import FrameFit
 from handey_studio.session import CommandState, session_to_bytes, write_session
 from handey_studio.session.calibrating import really_at
 from handey_studio.session.sequence import states_of
-from handey_studio.task.calibrate import RangeCalibration
+from handey_studio.task.calibrating.calibrate import RangeCalibration
 from handey_studio.task.export import FORMS, read_csv
 from tests.session.samples import fresh_session, full_session, library, performed_session
 

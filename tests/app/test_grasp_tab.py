@@ -10,13 +10,13 @@ import pytest
 from handey_studio.app.background import Background
 from handey_studio.app.grasp_commands import LookAtStanding, LookAway, PickCell, PickClass, ShowObstacles, looked_at, standing_pose
 from handey_studio.app.handling import Handle
+from handey_studio.app.pictures.classes import classes_html
+from handey_studio.app.pictures.dial import HEIGHT, KINDS, VIEW_M, WIDTH, dial_svg, dial_words, kind_of
+from handey_studio.app.pictures.plane import BOTH, PICKUP, PUTDOWN, grasp_plane_svg, iteration_at, plane_words
+from handey_studio.app.pictures.svg import PlaneView
+from handey_studio.app.pictures.table import cell_words, layout_of, table_html
 from handey_studio.app.setting_up import ChoosePart
 from handey_studio.app.state import Handled, opened
-from handey_studio.app.svg import PlaneView
-from handey_studio.app.svg_classes import classes_html
-from handey_studio.app.svg_dial import HEIGHT, KINDS, VIEW_M, WIDTH, dial_svg, dial_words, kind_of
-from handey_studio.app.svg_plane import BOTH, PICKUP, PUTDOWN, grasp_plane_svg, iteration_at, plane_words
-from handey_studio.app.svg_table import cell_words, layout_of, table_html
 from handey_studio.base import Ledger
 from handey_studio.geometry.transforms import apply
 from handey_studio.grasping import GOAL, START, ForbiddenRange, GraspPlane, plan_approach

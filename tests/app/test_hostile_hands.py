@@ -14,7 +14,7 @@ from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, 
 from handey_studio.app.modelling.tools import ChooseTool, ClickScene, SetTool
 from handey_studio.app.state import opened
 from handey_studio.base import BadInput
-from handey_studio.modeling.snap import Ray
+from handey_studio.modeling.picking.snap import Ray
 from tests.app.test_modelling import EYE, SIZE, Bench, refused, scan_of_carton
 from tests.app.test_modelling import bench as bench  # a carton that was scanned
 from tests.app.test_modelling import carton as carton  # and taken

@@ -34,8 +34,8 @@ from handey_studio.base import BadInput
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import transform
 from handey_studio.modeling.draft import with_scan
+from handey_studio.modeling.picking.snap import Ray
 from handey_studio.modeling.scans import Scan
-from handey_studio.modeling.snap import Ray
 from handey_studio.session import session_from_bytes, session_to_bytes
 from tests.modeling.looks import looking, moved, scan_of
 from tests.session.samples import fresh_session, library

@@ -15,10 +15,10 @@ from handey_studio.app.panels.grasp import grasp_facts
 from handey_studio.app.panels.ledger import context, entry_html, ledger_html
 from handey_studio.app.panels.sensing import counted, found_html, picked, word_of
 from handey_studio.app.panels.timeline import strip
+from handey_studio.app.pictures.plane import grasp_plane_svg
 from handey_studio.app.scene.cspace import FACING, slice_picture
 from handey_studio.app.scene.depth import elevation_span, stride_of, thinned
 from handey_studio.app.state import State, opened, with_view
-from handey_studio.app.svg_plane import grasp_plane_svg
 from handey_studio.base import Ledger
 from handey_studio.motion import CSpaceSummary
 from handey_studio.sensing.depth_map import DepthMap

@@ -7,7 +7,7 @@ import shapely
 import trimesh
 
 from handey_studio.app.palette import css
-from handey_studio.app.svg_thumbnail import SIGHT, _shade, part_thumbnail
+from handey_studio.app.pictures.thumbnail import SIGHT, _shade, part_thumbnail
 from handey_studio.geometry import box, prism
 from handey_studio.world import Library, Part
 

@@ -1,7 +1,7 @@
 """How deep true bodies are in one another."""
 
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.penetration import overlap, polytopes_of
+from handey_studio.cell.check.penetration import overlap, polytopes_of
 
 
 def body_overlap(a: SolidBody, b: SolidBody) -> float:

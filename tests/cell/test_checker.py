@@ -7,8 +7,8 @@ import pytest
 
 from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.checker import check_plan, names_in_plan
-from handey_studio.cell.shapes import Shape, body_shape, depth
+from handey_studio.cell.check.checker import check_plan, names_in_plan
+from handey_studio.cell.check.shapes import Shape, body_shape, depth
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
 from handey_studio.world import arm_of

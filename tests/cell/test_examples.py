@@ -5,10 +5,10 @@ from itertools import combinations
 import numpy as np
 
 from handey_studio.cell.bodies import fixed_bodies, solid_body
-from handey_studio.cell.checker import check_plan, names_in_plan
+from handey_studio.cell.check.checker import check_plan, names_in_plan
 from handey_studio.cell.examples import figure1
-from handey_studio.cell.fitness import graspable, visible_share
-from handey_studio.cell.physics import settle
+from handey_studio.cell.physics.settling import settle
+from handey_studio.cell.scenes.fitness import graspable, visible_share
 from handey_studio.cell.stripes import Surfaces
 from handey_studio.geometry.transforms import apply, inverse, pose_difference
 from handey_studio.world import arm_of

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from handey_studio.base import BadInput
-from handey_studio.cell.contacts import near
-from handey_studio.cell.path_check import _fixed, _moving, path_contacts
-from handey_studio.cell.shapes import depth
+from handey_studio.cell.check.contacts import near
+from handey_studio.cell.check.path_check import _fixed, _moving, path_contacts
+from handey_studio.cell.check.shapes import depth
 from handey_studio.geometry import HeightField, box
 from handey_studio.geometry.transforms import transform
 from handey_studio.world import Block, Held, Part, World, arm_of, load_robot

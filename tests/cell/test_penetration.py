@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.penetration import overlap, polytope
+from handey_studio.cell.check.penetration import overlap, polytope
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, transform
 from tests.cell.overlaps import body_overlap

@@ -10,18 +10,26 @@ from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody, fixed_bodies
 from handey_studio.cell.chessboard import Chessboard, board_poses, painted
 from handey_studio.cell.photographs import Exposure, body_paint, develop, look, room_light, see, stripe_light
-from handey_studio.cell.scan_folders import BOARDS, STRIPES, TRUE_FILE, FolderOptions, moved_steps, write_stage_folder, write_sweep_folder
+from handey_studio.cell.scenes.scan_folders import (
+    BOARDS,
+    STRIPES,
+    TRUE_FILE,
+    FolderOptions,
+    moved_steps,
+    write_stage_folder,
+    write_sweep_folder,
+)
 from handey_studio.cell.stripes import Surfaces, photograph, stripe_peaks
 from handey_studio.cell.workcell import Workcell
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse, transform
-from handey_studio.sensing.board import Board, find_corners
-from handey_studio.sensing.calibrate import CalibrateOptions, calibrate
-from handey_studio.sensing.instrument_file import read_instrument
-from handey_studio.sensing.photographs import Photograph
-from handey_studio.sensing.scan import depth_map_of, scan_folder
-from handey_studio.sensing.stripe_light import laser_colour, laser_light
-from handey_studio.sensing.stripe_peaks import find_peaks
+from handey_studio.sensing.stripes.board import Board, find_corners
+from handey_studio.sensing.stripes.calibrate import CalibrateOptions, calibrate
+from handey_studio.sensing.stripes.instrument_file import read_instrument
+from handey_studio.sensing.stripes.photographs import Photograph
+from handey_studio.sensing.stripes.scan import depth_map_of, scan_folder
+from handey_studio.sensing.stripes.stripe_light import laser_colour, laser_light
+from handey_studio.sensing.stripes.stripe_peaks import find_peaks
 
 CELL = Workcell()
 SMALL = tuple(replace(camera, focal_px=700.0, width=384, height=300) for camera in CELL.finder.cameras)

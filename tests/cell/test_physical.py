@@ -11,12 +11,12 @@ from handey_studio.base import BadInput
 from handey_studio.base.coding import from_plain, to_plain
 from handey_studio.cell import CannotAct, Cell, Fault, joined, tracking_error
 from handey_studio.cell.examples import figure1
-from handey_studio.cell.physical import PhysicalCell
+from handey_studio.cell.physics.physical import PhysicalCell
 from handey_studio.cell.simulated import simulated_cell
 from handey_studio.cell.workcell import SimulatedSetup, TrueBody, Workcell
 from handey_studio.geometry.transforms import from_xyz_rpy, inverse, pose_difference, transform
 from handey_studio.motion import PathResult, Trajectory, time_path
-from handey_studio.sensing.range_finder import RangeFinder
+from handey_studio.sensing.stripes.range_finder import RangeFinder
 from handey_studio.world import arm_of
 from handey_studio.world.world import Block
 from tests.cell.conftest import AHEAD, Arms, raised

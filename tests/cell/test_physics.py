@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handey_studio.cell.bodies import SolidBody, fixed_bodies, solid_body
-from handey_studio.cell.physics import SettleOptions, settle
+from handey_studio.cell.physics.settling import SettleOptions, settle
 from handey_studio.cell.workcell import TrueBody, Workcell
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy, pose_difference, transform

@@ -7,13 +7,13 @@ import pytest
 
 from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.fitness import graspable, visible_share
-from handey_studio.cell.physics import settle
-from handey_studio.cell.piles import PileOptions, destination, random_pile
+from handey_studio.cell.physics.settling import settle
+from handey_studio.cell.scenes.fitness import graspable, visible_share
+from handey_studio.cell.scenes.piles import PileOptions, destination, random_pile
 from handey_studio.cell.truth import true_bodies
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse, pose_difference, transform
-from handey_studio.sensing.range_finder import RangeFinder
+from handey_studio.sensing.stripes.range_finder import RangeFinder
 from tests.cell.overlaps import body_overlap
 
 

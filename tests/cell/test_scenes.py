@@ -10,9 +10,9 @@ import pytest
 from handey_studio.base import BadInput
 from handey_studio.cell.bodies import SolidBody, fixed_bodies
 from handey_studio.cell.camera import DepthCamera, SensorFaults, beside_jumps, look_exactly, pixels_alone, with_faults
-from handey_studio.cell.physics import settle
-from handey_studio.cell.scene_files import load_scene, save_scene
-from handey_studio.cell.scenes import SceneOptions, random_scene
+from handey_studio.cell.physics.settling import settle
+from handey_studio.cell.scenes.pile_scenes import SceneOptions, random_scene
+from handey_studio.cell.scenes.scene_files import load_scene, save_scene
 from handey_studio.cell.workcell import Workcell
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, inverse, pose_difference, transform

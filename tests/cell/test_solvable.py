@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from handey_studio.cell.alike import seen_alike
-from handey_studio.cell.solvable import solvable_move
+from handey_studio.cell.scenes.alike import seen_alike
+from handey_studio.cell.scenes.solvable import solvable_move
 from handey_studio.geometry import prism
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.grasping import stable_placements

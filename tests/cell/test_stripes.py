@@ -10,7 +10,7 @@ from handey_studio.cell.stripes import Surfaces, photograph, stripe_peaks
 from handey_studio.cell.workcell import Workcell
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse
-from handey_studio.sensing.range_finder import triangulate
+from handey_studio.sensing.stripes.range_finder import triangulate
 
 CELL = Workcell()
 FINDER = CELL.finder

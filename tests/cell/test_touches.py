@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handey_studio.cell.touches import Touches, normal_forces
+from handey_studio.cell.physics.touches import Touches, normal_forces
 
 TABLE, ROBOT, LEFT, RIGHT, PART, OTHER = range(6)
 

@@ -8,10 +8,10 @@ import pytest
 from handey_studio.base import BadInput
 from handey_studio.geometry import symmetries
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse, pose_difference
-from handey_studio.modeling.align import align
-from handey_studio.modeling.patches_finding import patches_of
-from handey_studio.modeling.suggest import suggest
-from handey_studio.modeling.suggest_report import aligned_box
+from handey_studio.modeling.aligning.align import align
+from handey_studio.modeling.patches.finding import patches_of
+from handey_studio.modeling.suggesting.report import aligned_box
+from handey_studio.modeling.suggesting.suggest import suggest
 from handey_studio.world import Library
 from tests.localization.rendering import resting_poses
 from tests.modeling.scenes import box_pose, boxes_seen, part_seen

@@ -17,7 +17,7 @@ from handey_studio.modeling.history import with_operation
 from handey_studio.modeling.operations import KINDS, AlignScan, ConfirmFace, Delete, Extrude, MoveFace, SetDistance
 from handey_studio.modeling.replay import replay
 from handey_studio.modeling.scans import Scan
-from handey_studio.modeling.suggestion import Suggestion
+from handey_studio.modeling.suggesting.suggestion import Suggestion
 from handey_studio.modeling.taking import take
 from handey_studio.sensing.depth_view import DepthView, Orthographic, Pinhole
 from handey_studio.world.model_files import read_polyhedron

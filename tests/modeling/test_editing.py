@@ -9,7 +9,7 @@ from handey_studio.geometry import Polyhedron, box, prism
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, rotate
 from handey_studio.modeling.editing import moved_corner, moved_edge, moved_face, with_angle, with_distance, with_length
 from handey_studio.modeling.lookup import corner_at, edge_at, face_at, reference_to_face
-from handey_studio.modeling.measuring import measure, measure_edge, measure_face
+from handey_studio.modeling.picking.measuring import measure, measure_edge, measure_face
 from handey_studio.modeling.references import CornerAt, EdgeAt, FaceAt
 from handey_studio.modeling.solids import combined
 from handey_studio.world.library import Library

@@ -29,13 +29,13 @@ from handey_studio.modeling.operations import (
     TakeSuggestion,
 )
 from handey_studio.modeling.outline import Outline
+from handey_studio.modeling.picking.snap import MODEL, Snap
 from handey_studio.modeling.references import CornerAt, EdgeAt, FaceAt
 from handey_studio.modeling.replay import replay
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.sketch_plane import sketch_plane
 from handey_studio.modeling.sketching import Stroke, clicked, constrained
-from handey_studio.modeling.snap import MODEL, Snap
-from handey_studio.modeling.suggestion import Alignment, Suggestion
+from handey_studio.modeling.suggesting.suggestion import Alignment, Suggestion
 from handey_studio.modeling.taking import reference_of, take, take_alignment
 from handey_studio.sensing.depth_view import DepthView, Pinhole
 from tests.modeling.models import UP, box_draft, check_built, check_solid, l_draft, top_plane

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handey_studio.base import BadInput
-from handey_studio.modeling.patches_finding import patch_at, patches_of
+from handey_studio.modeling.patches.finding import patch_at, patches_of
 from handey_studio.modeling.scans import Scan, scan_of_view
 from handey_studio.sensing.depth_view import DepthView, Orthographic, Pinhole
 from tests.modeling.scenes import PINHOLE, box_pose, boxes_seen

@@ -7,13 +7,13 @@ from handey_studio.cell.bodies import SolidBody
 from handey_studio.cell.stripes import photograph
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy
-from handey_studio.modeling.patches_sides import drift_of
+from handey_studio.modeling.patches.sides import drift_of
 from handey_studio.modeling.scans import Scan, scan_of_map
-from handey_studio.modeling.suggest import suggest
-from handey_studio.modeling.suggest_report import aligned_box
+from handey_studio.modeling.suggesting.report import aligned_box
+from handey_studio.modeling.suggesting.suggest import suggest
 from handey_studio.sensing.depth_view import DepthView
-from handey_studio.sensing.fusing import rim_of
-from handey_studio.sensing.range_finder import RangeFinder
+from handey_studio.sensing.stripes.fusing import rim_of
+from handey_studio.sensing.stripes.range_finder import RangeFinder
 from tests.modeling.scenes import box_pose, boxes_seen
 
 SIZE = np.array([0.10, 0.07, 0.16])

@@ -6,11 +6,11 @@ from hypothesis import strategies as st
 
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, inverse, rotate, transform
-from handey_studio.modeling.patches import Border, Patch, Patches
+from handey_studio.modeling.patches.patch import Border, Patch, Patches
+from handey_studio.modeling.picking.sightlines import meets_readings
+from handey_studio.modeling.picking.snap import MODEL, Ray, SnapOptions
+from handey_studio.modeling.picking.snapping import SUPPORT, pick, pickable
 from handey_studio.modeling.scans import Scan
-from handey_studio.modeling.sightlines import meets_readings
-from handey_studio.modeling.snap import MODEL, Ray, SnapOptions
-from handey_studio.modeling.snapping import SUPPORT, pick, pickable
 from handey_studio.sensing.depth_view import DepthView, Orthographic
 from handey_studio.sensing.view_map import STEEP_PX, STEEP_SIGMAS
 from tests.modeling.looks import looking, moved, scan_of

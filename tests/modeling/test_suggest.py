@@ -5,14 +5,14 @@ import pytest
 
 from handey_studio.geometry import prism
 from handey_studio.geometry.transforms import from_xyz_rpy
-from handey_studio.modeling.patches_finding import patches_of
-from handey_studio.modeling.patches_growing import _grow
-from handey_studio.modeling.patches_windows import _window_planes
+from handey_studio.modeling.patches.finding import patches_of
+from handey_studio.modeling.patches.growing import _grow
+from handey_studio.modeling.patches.windows import _window_planes
 from handey_studio.modeling.scans import Scan
-from handey_studio.modeling.suggest import suggest, suggest_object
-from handey_studio.modeling.suggest_fit import first_hits
-from handey_studio.modeling.suggest_report import aligned_box
-from handey_studio.modeling.suggest_warm_up import warm_up
+from handey_studio.modeling.suggesting.fit import first_hits
+from handey_studio.modeling.suggesting.report import aligned_box
+from handey_studio.modeling.suggesting.suggest import suggest, suggest_object
+from handey_studio.modeling.suggesting.warm_up import warm_up
 from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world import Library
 from tests.localization.rendering import resting_poses

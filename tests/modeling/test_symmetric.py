@@ -4,11 +4,11 @@ import numpy as np
 
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy
-from handey_studio.modeling.patches_finding import patches_of
-from handey_studio.modeling.suggest import suggest_object
-from handey_studio.modeling.suggest_mirrored import mirrored
-from handey_studio.modeling.suggest_outlines import Line, corners_of
-from handey_studio.modeling.suggest_report import aligned_box
+from handey_studio.modeling.patches.finding import patches_of
+from handey_studio.modeling.suggesting.mirrored import mirrored
+from handey_studio.modeling.suggesting.outlines import Line, corners_of
+from handey_studio.modeling.suggesting.report import aligned_box
+from handey_studio.modeling.suggesting.suggest import suggest_object
 from handey_studio.sensing.depth_view import Pinhole
 from handey_studio.world import Library
 from tests.localization.rendering import resting_poses

@@ -10,7 +10,7 @@ from handey_studio.motion.query import Query, query
 from handey_studio.motion.random_trees import grow_trees
 from handey_studio.motion.three_legs import three_legs
 from handey_studio.motion.wrist_ways import wrist_parts, wrist_ways
-from handey_studio.task.bench_motion.random_reaches import random_reaches
+from handey_studio.task.bench.motion.random_reaches import random_reaches
 from handey_studio.world import Library
 from handey_studio.world.collision import collision_model
 from tests.motion.oracle import ROBOT, Judge, reach, scene

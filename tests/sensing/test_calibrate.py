@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import apply, inverse, pose_difference, transform
-from handey_studio.sensing.board import Board, fit_camera, place_boards
-from handey_studio.sensing.board_stripes import on_board
-from handey_studio.sensing.calibrate import CalibrateOptions, laser_plane, one_step, range_frame
-from handey_studio.sensing.laser_planes import distances, plane_through
-from handey_studio.sensing.stripe_camera import StripeCamera
+from handey_studio.sensing.stripes.board import Board, fit_camera, place_boards
+from handey_studio.sensing.stripes.board_stripes import on_board
+from handey_studio.sensing.stripes.calibrate import CalibrateOptions, laser_plane, one_step, range_frame
+from handey_studio.sensing.stripes.laser_planes import distances, plane_through
+from handey_studio.sensing.stripes.stripe_camera import StripeCamera
 
 CAMERA = StripeCamera(
     np.eye(4), focal_px=1100.0, width=800, height=600, aspect=1.01, centre_px=(391.0, 310.0), distortion=(-0.12, 0.06, 0.0005, -0.0005, 0.0)

@@ -6,8 +6,8 @@ import pytest
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import apply, from_xyz_rpy
 from handey_studio.sensing.depth_view import Orthographic, Pinhole
-from handey_studio.sensing.files import DepthReading, read_depth
-from handey_studio.sensing.gridding import nearest_surface, without_pinholes
+from handey_studio.sensing.reading.files import DepthReading, read_depth
+from handey_studio.sensing.reading.gridding import nearest_surface, without_pinholes
 from tests.sensing.cloud_files import write_pcd, write_ply
 from tests.sensing.scenes import cast, looking_at, pile
 

@@ -6,9 +6,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from handey_studio.base import BadInput
-from handey_studio.sensing.clouds import read_npy
-from handey_studio.sensing.pcd import read_pcd, unpack_lzf
-from handey_studio.sensing.ply import read_ply
+from handey_studio.sensing.reading.clouds import read_npy
+from handey_studio.sensing.reading.pcd import read_pcd, unpack_lzf
+from handey_studio.sensing.reading.ply import read_ply
 from tests.sensing.cloud_files import pack_lzf, write_pcd, write_ply
 
 PLY_KINDS = ("ascii", "binary_little_endian", "binary_big_endian")

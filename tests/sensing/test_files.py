@@ -9,7 +9,7 @@ import pytest
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.sensing.depth_view import Pinhole
-from handey_studio.sensing.files import read_depth
+from handey_studio.sensing.reading.files import read_depth
 
 CAMERA = {"fx": 300.0, "fy": 310.0, "cx": 40.5, "cy": 29.5, "depth_scale": 0.1}
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
-from handey_studio.sensing.instrument import Instrument, instrument_of
-from handey_studio.sensing.instrument_file import read_instrument, write_instrument
-from handey_studio.sensing.laser_planes import plane_through
-from handey_studio.sensing.range_finder import RangeFinder
-from handey_studio.sensing.stripe_camera import camera_looking_at
+from handey_studio.sensing.stripes.instrument import Instrument, instrument_of
+from handey_studio.sensing.stripes.instrument_file import read_instrument, write_instrument
+from handey_studio.sensing.stripes.laser_planes import plane_through
+from handey_studio.sensing.stripes.range_finder import RangeFinder
+from handey_studio.sensing.stripes.stripe_camera import camera_looking_at
 
 CAMERA = replace(camera_looking_at((-0.3, 0.0, 0.5), (0.0, 0.0, 0.0)), distortion=(-0.1, 0.05, 0.001, 0.0, 0.0), centre_px=(400.5, 350.25))
 STAGE = Instrument(

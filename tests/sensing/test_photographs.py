@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handey_studio.base import BadInput
-from handey_studio.sensing.photographs import Photograph, dark_frame_of, list_photographs, read_photograph
-from handey_studio.sensing.stripe_light import laser_colour, laser_light
-from handey_studio.sensing.stripe_peaks import find_peaks
+from handey_studio.sensing.stripes.photographs import Photograph, dark_frame_of, list_photographs, read_photograph
+from handey_studio.sensing.stripes.stripe_light import laser_colour, laser_light
+from handey_studio.sensing.stripes.stripe_peaks import find_peaks
 from tests.sensing.stripe_images import noisy, stripe
 
 CENTRES = 60.0 + np.linspace(-4, 4, 100)

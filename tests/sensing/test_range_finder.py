@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import apply, from_xyz_rpy, inverse
-from handey_studio.sensing.range_finder import RangeFinder, camera_looking_at, fuse, triangulate
+from handey_studio.sensing.stripes.range_finder import RangeFinder, camera_looking_at, fuse, triangulate
 
 FINDER = RangeFinder()
 CELL = FINDER.cell

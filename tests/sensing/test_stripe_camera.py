@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import apply, inverse
-from handey_studio.sensing.laser_planes import distances, fit_plane, moved_planes, plane_through, turning_planes
-from handey_studio.sensing.stripe_camera import camera_looking_at, points_on_planes
+from handey_studio.sensing.stripes.laser_planes import distances, fit_plane, moved_planes, plane_through, turning_planes
+from handey_studio.sensing.stripes.stripe_camera import camera_looking_at, points_on_planes
 
 PLAIN = camera_looking_at((-0.3, 0.1, 0.6), (0.0, 0.1, 0.0))
 LENSES = (

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import curve_fit
 
 from handey_studio.base import BadInput
-from handey_studio.sensing.stripe_peaks import PeakOptions, find_peaks, stripe_direction
+from handey_studio.sensing.stripes.stripe_peaks import PeakOptions, find_peaks, stripe_direction
 from tests.sensing.stripe_images import noisy, none_saturated, stripe
 
 ROWS, WIDTH = 120, 160

@@ -13,7 +13,7 @@ from handey_studio.localization import DataEdge, Hypothesis, LocateResult
 from handey_studio.motion import Certificate
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.session import Session, new_session
-from handey_studio.task.performance import Check, Incident, Performance, Performed, Recovery
+from handey_studio.task.acting.performance import Check, Incident, Performance, Performed, Recovery
 from handey_studio.task.plan import Attempt, Carry, GraspChoice, MoveCommand, MovePlan, MoveResult, Step
 from handey_studio.task.ruled_out import RuledOut
 from handey_studio.task.sense import Scene

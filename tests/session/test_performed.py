@@ -7,7 +7,7 @@ import pytest
 
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.session import PerformedReplay, attempts_of, replay_of, seconds_of
-from handey_studio.task.performance import Check, Incident
+from handey_studio.task.acting.performance import Check, Incident
 from handey_studio.world import Library, arm_of
 from tests.session.samples import T_START, hand_made_performance, hand_made_plan, performed_session
 

@@ -11,9 +11,9 @@ from functools import lru_cache
 import numpy as np
 
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.checker import CheckOptions
-from handey_studio.cell.contacts import Sampled, contacts, true_scene
-from handey_studio.cell.penetration import overlap, polytope, polytopes_of
+from handey_studio.cell.check.checker import CheckOptions
+from handey_studio.cell.check.contacts import Sampled, contacts, true_scene
+from handey_studio.cell.check.penetration import overlap, polytope, polytopes_of
 from handey_studio.geometry.transforms import apply
 from handey_studio.world import FINGERS, Part, Robot, arm_of
 

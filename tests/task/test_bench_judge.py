@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from handey_studio.cell.physical import PhysicalCell
+from handey_studio.cell.physics.physical import PhysicalCell
 from handey_studio.cell.workcell import SimulatedSetup, TrueBody
 from handey_studio.geometry.transforms import from_xyz_rpy
-from handey_studio.task.bench_judge import past_recovery
-from handey_studio.task.shared_out import shared_out
+from handey_studio.task.bench.judge import past_recovery
+from handey_studio.task.bench.shared_out import shared_out
 from tests.task.troubled import COMMAND, LIBRARY, station, workcell
 
 LIES = from_xyz_rpy((0.46, -0.08, 0.015), (0.0, 0.0, 0.4))

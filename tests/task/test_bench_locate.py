@@ -13,21 +13,21 @@ import pytest
 from handey_studio.base import BadInput, Silent
 from handey_studio.cell.bodies import SolidBody, fixed_bodies
 from handey_studio.cell.camera import DepthCamera, look_exactly
-from handey_studio.cell.scene_files import save_scene
-from handey_studio.cell.scenes import SceneOptions, TruePose, random_scene
+from handey_studio.cell.scenes.pile_scenes import SceneOptions, TruePose, random_scene
+from handey_studio.cell.scenes.scene_files import save_scene
 from handey_studio.cell.workcell import Workcell
 from handey_studio.cli import main
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy, inverse, rotation_about, transform
 from handey_studio.localization import Hypothesis, LocatedPose, LocateResult
 from handey_studio.sensing.depth_view import DepthView, Pinhole
-from handey_studio.task.bench_locate import answers, bench_locate, command, peers, plot, run_bench
-from handey_studio.task.bench_locate.answers import Answer, Pose
-from handey_studio.task.bench_locate.label_judge import LabelJudge, Labelled
-from handey_studio.task.bench_locate.labelled_scenes import LabelledScene, load_labelled, scene_folders
-from handey_studio.task.bench_locate.peer_worker import around, first_of_voxels, share_on
-from handey_studio.task.bench_locate.summary import summarise, table
-from handey_studio.task.bench_locate.truth_judge import TruthJudge
+from handey_studio.task.bench.locate import answers, bench_locate, command, peers, plot, run_bench
+from handey_studio.task.bench.locate.answers import Answer, Pose
+from handey_studio.task.bench.locate.label_judge import LabelJudge, Labelled
+from handey_studio.task.bench.locate.labelled_scenes import LabelledScene, load_labelled, scene_folders
+from handey_studio.task.bench.locate.peer_worker import around, first_of_voxels, share_on
+from handey_studio.task.bench.locate.summary import summarise, table
+from handey_studio.task.bench.locate.truth_judge import TruthJudge
 from handey_studio.world import Library, Part, write_obj
 from handey_studio.world.library import bundled
 
@@ -241,7 +241,7 @@ def test_seeds_are_simulated_once_and_kept(library, tmp_path, monkeypatch):
         made.append((seed, options.sensor))
         return random_scene(seed, library, small)
 
-    monkeypatch.setattr("handey_studio.task.bench_locate.labelled_scenes.random_scene", make)
+    monkeypatch.setattr("handey_studio.task.bench.locate.labelled_scenes.random_scene", make)
     monkeypatch.setattr(command, "Handey", lambda ask: Told({}))
     report = run_bench(library, lambda line: None, Silent(), seeds=range(3, 5), scenes=tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0003", "0004"] and len(report["rows"]) == 12

@@ -11,13 +11,13 @@ from handey_studio import cli
 from handey_studio.base import BadInput
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
-from handey_studio.task.bench_motion import peers
-from handey_studio.task.bench_motion.answers import Answer, judged, least_clearance, sampled
-from handey_studio.task.bench_motion.peer_worker import Bodies
-from handey_studio.task.bench_motion.problems import Problem, length, problem_files, read_problems
-from handey_studio.task.bench_motion.random_reaches import DEEP_M, random_reaches
-from handey_studio.task.bench_motion.summary import summarise, table
-from handey_studio.task.bench_motion.urdf import export
+from handey_studio.task.bench.motion import peers
+from handey_studio.task.bench.motion.answers import Answer, judged, least_clearance, sampled
+from handey_studio.task.bench.motion.peer_worker import Bodies
+from handey_studio.task.bench.motion.problems import Problem, length, problem_files, read_problems
+from handey_studio.task.bench.motion.random_reaches import DEEP_M, random_reaches
+from handey_studio.task.bench.motion.summary import summarise, table
+from handey_studio.task.bench.motion.urdf import export
 from handey_studio.world import Block, ConvexBody, Held, Part, World, arm_of, load_robot
 from handey_studio.world.collision import collision_model
 from tests.test_cli_path import GOAL, PILLAR, START, body, request_of, scene_of
@@ -142,7 +142,7 @@ def test_summary_of_rows():
 
 def test_plot(tmp_path):
     pytest.importorskip("matplotlib")
-    from handey_studio.task.bench_motion.plot import plot
+    from handey_studio.task.bench.motion.plot import plot
 
     found = {"method": "a", "seconds": 1.0, "ends_free": True, "found": True, "length_rad": 2.0, "collisions": []}
     plot([found, found | {"method": "b", "found": False}, found | {"ends_free": False}], tmp_path / "table.svg")

@@ -8,8 +8,8 @@ import pytest
 
 from handey_studio import cli
 from handey_studio.motion import configuration_space
-from handey_studio.task.bench_motion import space_cells
-from handey_studio.task.bench_motion.space_scenes import space_scene
+from handey_studio.task.bench.motion import space_cells
+from handey_studio.task.bench.motion.space_scenes import space_scene
 from handey_studio.world import load_robot
 from handey_studio.world.collision import collision_model
 

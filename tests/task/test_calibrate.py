@@ -18,8 +18,8 @@ from handey_studio.sensing.view_map import depth_map_of
 from handey_studio.session import find_session, read_session
 from handey_studio.session.calibrating import calibrated, cell_with_cube, misplaced, really_at
 from handey_studio.session.run import cell_of, station_of
-from handey_studio.task.calibrate import CUBE, CalibrateOptions, calibrate_range
-from handey_studio.task.calibration_report import calibration_lines, calibration_report
+from handey_studio.task.calibrating.calibrate import CUBE, CalibrateOptions, calibrate_range
+from handey_studio.task.calibrating.report import calibration_lines, calibration_report
 from handey_studio.world import Library, arm_of
 from handey_studio.world.library import bundled
 

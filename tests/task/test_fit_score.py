@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handey_studio.base import BadInput
-from handey_studio.cell.scene_files import save_scene
-from handey_studio.cell.scenes import SceneOptions, TruePose, random_scene
+from handey_studio.cell.scenes.pile_scenes import SceneOptions, TruePose, random_scene
+from handey_studio.cell.scenes.scene_files import save_scene
 from handey_studio.cli import main
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
 from handey_studio.localization.fitted import TABLE
@@ -17,10 +17,10 @@ from handey_studio.localization.joint import MAX_CLAIMED, SAME_READINGS, WITHIN,
 from handey_studio.localization.promise import FEATURES as PROMISES
 from handey_studio.localization.promise import PromiseWeights, promise_weights
 from handey_studio.localization.score import FEATURES, FITTED, ScoreWeights, weights_from
-from handey_studio.task.bench_locate.fit_score import FittedWeights, calibration, held_out, toml
-from handey_studio.task.bench_locate.logit import conditional, fit, fit_order
-from handey_studio.task.bench_locate.truth_judge import pose_error
-from handey_studio.task.bench_locate.weighed import Lineup, Weighed, instances_of, is_right
+from handey_studio.task.bench.locate.fit_score import FittedWeights, calibration, held_out, toml
+from handey_studio.task.bench.locate.logit import conditional, fit, fit_order
+from handey_studio.task.bench.locate.truth_judge import pose_error
+from handey_studio.task.bench.locate.weighed import Lineup, Weighed, instances_of, is_right
 from handey_studio.world import Library
 from handey_studio.world.library import bundled
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handey_studio.cell.checker import check_plan, names_in_plan
+from handey_studio.cell.check.checker import check_plan, names_in_plan
 from handey_studio.cell.geometric import GeometricCell
 from handey_studio.geometry.transforms import inverse, pose_difference
 from handey_studio.localization import Rival

@@ -13,10 +13,10 @@ from handey_studio.cell.recording import Event, Recording
 from handey_studio.geometry.transforms import from_xyz_rpy, inverse, pose_difference, transform
 from handey_studio.localization import LocatedPose, LocateResult, Rival
 from handey_studio.sensing.depth_map import DepthMap
-from handey_studio.task.looking import PlaceLimits, changed, check_place, readings_of, wrong_place
-from handey_studio.task.noticing import Hold, came_down, closed_on, fingers_went, gave_way, still_held
-from handey_studio.task.performance import thinned
-from handey_studio.task.recover import felt_block
+from handey_studio.task.acting.looking import PlaceLimits, changed, check_place, readings_of, wrong_place
+from handey_studio.task.acting.noticing import Hold, came_down, closed_on, fingers_went, gave_way, still_held
+from handey_studio.task.acting.performance import thinned
+from handey_studio.task.acting.recover import felt_block
 from handey_studio.task.ruled_out import TURNED, RuledOut, grasp_ruled_out, place_ruled_out, way_ruled_out
 from handey_studio.task.sense import Scene
 from handey_studio.world import Library, PlacedPart

@@ -8,8 +8,8 @@ import pytest
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.session import Session, session_from_bytes, session_to_bytes
 from handey_studio.task import MoveCommand
+from handey_studio.task.acting.way_back import _reversed
 from handey_studio.task.report import move_report
-from handey_studio.task.way_back import _reversed
 from tests.task.troubled import GOAL, LIBRARY, Troubled, moved, station, workcell
 
 TROUBLES = ("missed", "dropped", "blocked", "early contact", "wrong place", "moved")

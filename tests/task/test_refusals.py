@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.penetration import overlap, polytope, polytopes_of
+from handey_studio.cell.check.penetration import overlap, polytope, polytopes_of
 from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.grasping import stable_placements

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handey_studio.cell.bodies import SolidBody
-from handey_studio.cell.checker import check_plan
+from handey_studio.cell.check.checker import check_plan
 from handey_studio.geometry import HeightField, box
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.grasping import stable_placements, topples_by

@@ -9,7 +9,7 @@ from handey_studio.cell.protocol import Moved
 from handey_studio.cell.workcell import SimulatedSetup, TrueBody, Workcell
 from handey_studio.geometry.transforms import from_xyz_rpy, transform
 from handey_studio.motion import Trajectory
-from handey_studio.sensing.range_finder import RangeFinder
+from handey_studio.sensing.stripes.range_finder import RangeFinder
 from handey_studio.task import MoveCommand, MoveOptions, RecoveryOptions, Station, run_move
 from handey_studio.world import Library
 

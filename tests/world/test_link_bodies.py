@@ -31,7 +31,7 @@ def test_the_pieces_hold_the_exact_mesh(body):
     surface = on_surface(body.vertices, body.triangles, 3000, rng)
     assert beyond(surface, body.hulls) < 1e-6 and beyond(body.vertices, body.hulls) < 1e-6
     inner = surface[:1500] + rng.uniform(size=(1500, 1)) * (surface[1500:] - surface[:1500])
-    from handey_studio.cell.shapes import link_shape
+    from handey_studio.cell.check.shapes import link_shape
 
     inside = np.array([link_shape(body).holds(point) for point in inner[:150]])
     assert inside.sum() > 20 and beyond(inner[:150][inside], body.hulls) < 1e-6

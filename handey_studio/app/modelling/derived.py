@@ -9,12 +9,12 @@ from handey_studio.app.state import State, same
 from handey_studio.localization import LocateResult
 from handey_studio.modeling.draft import Draft
 from handey_studio.modeling.operations import AlignScan, Operation, TakeSuggestion
-from handey_studio.modeling.patches import Patches
-from handey_studio.modeling.patches_finding import patch_at
+from handey_studio.modeling.patches.finding import patch_at
+from handey_studio.modeling.patches.patch import Patches
+from handey_studio.modeling.picking.snapping import Pickable
 from handey_studio.modeling.replay import Built, Step
 from handey_studio.modeling.scans import Scan
-from handey_studio.modeling.snapping import Pickable
-from handey_studio.modeling.suggestion import Alignment, Suggestion
+from handey_studio.modeling.suggesting.suggestion import Alignment, Suggestion
 from handey_studio.modeling.truth_values import Truth
 from handey_studio.session.graspable import Graspable
 from handey_studio.session.model_look import built_of, clickable, shown_poses, unaligned

@@ -9,9 +9,9 @@ from handey_studio.app.modelling.tool_clicks import EXTRUDE, check_apart, with_c
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.modeling.operations import Extrude, Sketch
+from handey_studio.modeling.picking.snap import Ray, Snap
 from handey_studio.modeling.references import FaceAt
 from handey_studio.modeling.sketching import SketchOptions, clicked, closed
-from handey_studio.modeling.snap import Ray, Snap
 from handey_studio.session.strokes import box_of, guides_of, on_model, on_plane, plane_of, sketch_frame
 
 

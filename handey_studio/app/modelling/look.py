@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from handey_studio.geometry import Polyhedron
 from handey_studio.modeling.operations import Combine
+from handey_studio.modeling.picking.snap import Snap
 from handey_studio.modeling.references import FaceAt
 from handey_studio.modeling.scans import Scan
 from handey_studio.modeling.sketching import Guides, Stroke
-from handey_studio.modeling.snap import Snap
 from handey_studio.session.mesh_files import MeshUpload
 from handey_studio.session.model_files import Upload
 

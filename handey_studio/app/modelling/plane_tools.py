@@ -9,9 +9,9 @@ from handey_studio.app.modelling.steps import operated
 from handey_studio.app.modelling.tool_clicks import MEASURE, check_apart, with_click
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
-from handey_studio.modeling.measuring import Measurement, measure
 from handey_studio.modeling.operations import CutByPlane, Mirror
-from handey_studio.modeling.snap import Snap
+from handey_studio.modeling.picking.measuring import Measurement, measure
+from handey_studio.modeling.picking.snap import Snap
 from handey_studio.modeling.taking import reference_of
 from handey_studio.session.strokes import plane_normal, plane_of
 

@@ -7,7 +7,7 @@ from handey_studio.app.modelling.tool_clicks import with_click, with_tool
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import apply, inverse
-from handey_studio.modeling.snap import MODEL, Snap
+from handey_studio.modeling.picking.snap import MODEL, Snap
 from handey_studio.session.model_look import unaligned
 from handey_studio.session.strokes import pixel_of
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from handey_studio.app.modelling import derived
 from handey_studio.app.state import State
-from handey_studio.modeling.patches import Patches
+from handey_studio.modeling.patches.patch import Patches
 from handey_studio.session.model_look import points_of
 
 AWAY = np.array([0.42, -0.80, 0.72])  # from the front, the side and above

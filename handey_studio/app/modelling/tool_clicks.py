@@ -7,7 +7,7 @@ import numpy as np
 from handey_studio.app.modelling.look import SELECT
 from handey_studio.app.state import State
 from handey_studio.base import BadInput
-from handey_studio.modeling.snap import Snap
+from handey_studio.modeling.picking.snap import Snap
 
 BOX, SKETCH, EXTRUDE, CUT, MIRROR, MEASURE = "box", "sketch", "extrude", "cut", "mirror", "measure"
 SAME_M = 5e-4  # clicks nearer than this are one

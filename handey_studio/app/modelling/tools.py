@@ -12,8 +12,8 @@ from handey_studio.app.modelling.selecting import aligned_by_points, points_clic
 from handey_studio.app.modelling.showing import look_at_scans
 from handey_studio.app.modelling.tool_clicks import BOX, CUT, EXTRUDE, MEASURE, MIRROR, SKETCH, with_tool
 from handey_studio.app.state import State
-from handey_studio.modeling.snap import Ray, Snap, SnapOptions
-from handey_studio.modeling.snapping import pick
+from handey_studio.modeling.picking.snap import Ray, Snap, SnapOptions
+from handey_studio.modeling.picking.snapping import pick
 from handey_studio.session.model_look import unaligned
 
 

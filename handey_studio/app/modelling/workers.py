@@ -17,13 +17,14 @@ from handey_studio.app.state import State
 from handey_studio.base import BadInput
 from handey_studio.geometry import Polyhedron
 from handey_studio.localization import LocateResult, localize
-from handey_studio.modeling import sightlines, suggest_warm_up
-from handey_studio.modeling.align import align
-from handey_studio.modeling.patches import Patches
-from handey_studio.modeling.patches_finding import patches_of
+from handey_studio.modeling.aligning.align import align
+from handey_studio.modeling.patches.finding import patches_of
+from handey_studio.modeling.patches.patch import Patches
+from handey_studio.modeling.picking import sightlines
 from handey_studio.modeling.scans import Scan
-from handey_studio.modeling.suggest import suggest
-from handey_studio.modeling.suggestion import Alignment, Suggestion
+from handey_studio.modeling.suggesting import warm_up as suggest_warm_up
+from handey_studio.modeling.suggesting.suggest import suggest
+from handey_studio.modeling.suggesting.suggestion import Alignment, Suggestion
 from handey_studio.modeling.truth import truth
 from handey_studio.modeling.truth_values import Truth
 from handey_studio.session.graspable import graspable

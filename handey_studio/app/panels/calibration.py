@@ -16,8 +16,8 @@ from handey_studio.app.palette import css
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.sensing.frame_fit import FitOptions, FrameFit
-from handey_studio.task.calibrate import RangeCalibration
-from handey_studio.task.calibration_report import calibration_lines
+from handey_studio.task.calibrating.calibrate import RangeCalibration
+from handey_studio.task.calibrating.report import calibration_lines
 
 HOW = "The hand holds a cube and shows it here and there; its upper face is found in each scan. The first three poses are the paper's (§6)."
 WIDTH, ROW, LEFT = 270.0, 15.0, 26.0

@@ -8,11 +8,11 @@ import viser
 
 from handey_studio.app import html
 from handey_studio.app.grasp_commands import LookAtStanding, LookAway, PickCell, PickClass, ShowObstacles, looked_at
+from handey_studio.app.pictures.classes import classes_html
+from handey_studio.app.pictures.dial import dial_chips, dial_svg, dial_words, window_of
+from handey_studio.app.pictures.plane import OBSTACLES, PICKUP, grasp_plane_svg, plane_chips, plane_words
+from handey_studio.app.pictures.table import layout_of, table_html
 from handey_studio.app.state import State
-from handey_studio.app.svg_classes import classes_html
-from handey_studio.app.svg_dial import dial_chips, dial_svg, dial_words, window_of
-from handey_studio.app.svg_plane import OBSTACLES, PICKUP, grasp_plane_svg, plane_chips, plane_words
-from handey_studio.app.svg_table import layout_of, table_html
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.grasping import Grip
 from handey_studio.session.handling import fates, way_through

@@ -23,7 +23,7 @@ from handey_studio.app.panels.move import choose
 from handey_studio.app.panels.tools import TOOLS, toolbar
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, on_submit, on_upload, on_user, set_to
-from handey_studio.modeling.snap import MODEL
+from handey_studio.modeling.picking.snap import MODEL
 from handey_studio.session.mesh_files import SUFFIXES
 from handey_studio.session.model_look import assumed_faces, proposals, unaligned
 

@@ -8,10 +8,10 @@ from handey_studio.app import html, palette
 from handey_studio.app.modelling import derived
 from handey_studio.app.modelling.parts import known_part
 from handey_studio.app.palette import RESIDUAL, RESIDUAL_AT, css
+from handey_studio.app.pictures.classes import OPEN, class_svg, class_view
+from handey_studio.app.pictures.thumbnail import part_thumbnail
 from handey_studio.app.scene.modelling.scans import distance_limit
 from handey_studio.app.state import State
-from handey_studio.app.svg_classes import OPEN, class_svg, class_view
-from handey_studio.app.svg_thumbnail import part_thumbnail
 from handey_studio.base import describe, measured
 from handey_studio.geometry import Polyhedron
 from handey_studio.modeling.doubts import DOUBTS

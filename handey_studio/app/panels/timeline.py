@@ -7,9 +7,9 @@ import viser
 from handey_studio.app import html
 from handey_studio.app.looking_at import ToggleLayer
 from handey_studio.app.palette import STEP_COLOURS, css
+from handey_studio.app.pictures.plots import cursor, now_words, plots_html
 from handey_studio.app.playback import Seek, SeekStep, SetPlayback, TogglePlay
 from handey_studio.app.state import State
-from handey_studio.app.svg_plots import cursor, now_words, plots_html
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
 from handey_studio.session import PerformedReplay, Stretch
 

@@ -9,7 +9,7 @@ from handey_studio.app.scene.units import SCALE, place, scaled
 from handey_studio.app.state import State
 from handey_studio.cell import Workcell
 from handey_studio.geometry.transforms import apply
-from handey_studio.sensing.range_finder import RangeFinder
+from handey_studio.sensing.stripes.range_finder import RangeFinder
 
 TABLE_M = (1.3, 1.3, 0.03)
 TABLE_AT_M = (0.25, 0.0)

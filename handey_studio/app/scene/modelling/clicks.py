@@ -18,8 +18,8 @@ from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_scene_click
 from handey_studio.base import measured
 from handey_studio.geometry.transforms import apply
+from handey_studio.modeling.picking.snap import MODEL, Ray, Snap
 from handey_studio.modeling.sketch_plane import sketch_plane
-from handey_studio.modeling.snap import MODEL, Ray, Snap
 
 ROOT = "/model/clicks"
 DOT_M = 0.0016

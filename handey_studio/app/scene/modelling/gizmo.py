@@ -13,9 +13,9 @@ from handey_studio.app.scene.units import metres, place
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send
 from handey_studio.geometry.transforms import transform
+from handey_studio.modeling.picking.snap import Snap
 from handey_studio.modeling.references import FaceAt
 from handey_studio.modeling.sketch_plane import sketch_plane
-from handey_studio.modeling.snap import Snap
 from handey_studio.session.strokes import on_model
 
 NAME = "/model/gizmo"

@@ -13,7 +13,7 @@ from handey_studio.app.palette import residual_colours
 from handey_studio.app.scene.units import scaled
 from handey_studio.app.state import State
 from handey_studio.geometry.transforms import apply
-from handey_studio.modeling.patches import Patches
+from handey_studio.modeling.patches.patch import Patches
 from handey_studio.modeling.scans import Scan
 from handey_studio.session.model_look import ground_of, points_of, spacing_of
 

@@ -1,0 +1,1 @@
+"""Pictures of plans, grasps and parts as SVG text."""

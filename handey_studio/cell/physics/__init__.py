@@ -1,0 +1,1 @@
+"""The simulated cell with forces (MuJoCo). No planner imports this."""

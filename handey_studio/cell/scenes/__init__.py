@@ -1,0 +1,1 @@
+"""Random scenes by seed, as their hidden truth. No planner imports this."""

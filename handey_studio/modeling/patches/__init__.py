@@ -1,0 +1,1 @@
+"""The planar faces that one scan shows, with their outlines."""

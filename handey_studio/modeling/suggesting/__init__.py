@@ -1,0 +1,1 @@
+"""Whole closed solids proposed from what the scans show."""

@@ -1,0 +1,1 @@
+"""Depth from files: images and clouds, organised or not, in any orientation."""

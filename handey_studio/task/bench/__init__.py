@@ -1,0 +1,1 @@
+"""Benchmarks: whole tasks in many random scenes, judged against the hidden truth."""

@@ -1,0 +1,1 @@
+"""§6: calibrating the range finder to the robot."""
