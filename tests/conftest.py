@@ -3,6 +3,8 @@
 The cores share the tests: each file stays in one process, for what it prepares, and all that drive a browser in one, for its patience.
 """
 
+from typing import Any
+
 import pytest
 from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
@@ -21,7 +23,7 @@ class ByFile(LoadScopeScheduling):
         return BROWSER if nodeid.startswith(BROWSER) else nodeid.split("::")[0]
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> ByFile:
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByFile:
     return ByFile(config, log)
 
 
