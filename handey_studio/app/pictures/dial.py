@@ -72,9 +72,9 @@ def dial_chips(grasp: GraspChoice) -> list[tuple[RGB, str]]:
 def dial_words(grasp: GraspChoice) -> str:
     """How much is legal, and what forbids the rest, in degrees off crossing the first edge at right angles."""
     low, high = window_of(grasp)
-    if not grasp.forbidden:
-        return "This plan kept no forbidden angles; plan again to see what forbids which."
     legal = np.rad2deg(sum(b - a for a, b in grasp.ranges))
+    if not grasp.forbidden:
+        return f"All {legal:.0f}° are legal: nothing is in the hand's way."
     said = f"{legal:.0f}° of {np.rad2deg(high - low):.0f}° are legal. Angles count from crossing the first edge (red) at right angles."
     named = [f.body for f in sorted(grasp.forbidden, key=lambda f: f.low - f.high) if f.body]
     return said + (f" In the way: {', '.join(dict.fromkeys(named))}." if named else "")
