@@ -73,6 +73,7 @@ def is_rigid(T: ArrayLike, tolerance: float = 1e-6) -> bool:
         T.shape == (4, 4)
         and np.isfinite(T).all()
         and np.abs(T[3] - (0, 0, 0, 1)).max() <= tolerance
+        and np.abs(T[:3, :3]).max() <= 1.0 + tolerance
         and np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() <= tolerance
         and np.linalg.det(T[:3, :3]) > 0
     )
