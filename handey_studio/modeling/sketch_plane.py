@@ -30,13 +30,6 @@ def sketch_plane(point: ArrayLike, normal: ArrayLike, along: ArrayLike | None = 
     return T
 
 
-def longest_side(ring: ArrayLike) -> NDArray:
-    """The unit direction (3,) of the longest side of a closed ring (n, 3) [m]: the natural x of a face or a patch."""
-    ring = np.asarray(ring, dtype=float)
-    sides = np.roll(ring, -1, axis=0) - ring
-    return unit(sides[int(np.argmax(np.linalg.norm(sides, axis=1)))], "the longest side of the outline")
-
-
 def guides_in_plane(T_model_plane: NDArray, points: ArrayLike, segments: ArrayLike, near_m: float = NEAR_PLANE_M) -> Guides:
     """What a sketch's clicks may snap to: of `points` (k, 3) and `segments` (m, 2, 3) [m] those within `near_m` of the plane, and the
     directions of all segments that run along it, each once."""

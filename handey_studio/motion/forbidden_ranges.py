@@ -10,9 +10,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base.compiled import put
+from handey_studio.motion.circles import Circles, needs, place
 from handey_studio.motion.cores import share
 from handey_studio.motion.distance_field import Field
-from handey_studio.motion.marching import DOUBT, FREE, LACKING, SOLID, Circles, march, needs, place, refine, room
+from handey_studio.motion.marching import DOUBT, FREE, LACKING, SOLID, march, refine, room
 
 EVERY_BALL = 2**32 - 1
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.geometry.transforms import inverse
+from handey_studio.motion.circles import Circles
 from handey_studio.motion.forbidden_ranges import Hinges
-from handey_studio.motion.marching import Circles
 from handey_studio.motion.wrist_box import WristBox, gather, link_balls
 from handey_studio.world import Robot, arm_of
 

@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Value, frozen_array, measured
-from handey_studio.geometry import Polyhedron
-from handey_studio.modeling.lookup import edge_at, face_at
 from handey_studio.modeling.references import CornerAt, EdgeAt, FaceAt, Reference
 
 PARALLEL_RAD = float(np.deg2rad(0.5))  # nearer to parallel than this a distance says more than the angle
@@ -15,7 +13,7 @@ PARALLEL_RAD = float(np.deg2rad(0.5))  # nearer to parallel than this a distance
 
 @dataclass(frozen=True, eq=False)
 class Measurement(Value):
-    """What was measured: `value` in `unit` ("m", "rad" or "m²"), `sentence` as people read it, and the line (2, 3) [m] to draw it
+    """What was measured: `value` in `unit` ("m" or "rad"), `sentence` as people read it, and the line (2, 3) [m] to draw it
     along. `off_parallel` [rad]: how far two faces or edges whose distance it is are from parallel."""
 
     value: float
@@ -43,21 +41,6 @@ def measure(a: Reference, b: Reference) -> Measurement:
     if turn > PARALLEL_RAD:
         return Measurement(turn, "rad", f"the angle is {measured(turn, 'rad')}", np.array([a.point, b.point]))
     return _from_point(a, b.point, turn)
-
-
-def measure_edge(solid: Polyhedron, at: EdgeAt) -> Measurement:
-    """The length of an edge of the solid. Raises BadInput when none is there."""
-    edge, _ = edge_at(solid, at)
-    ends = solid.vertices[[edge.start, edge.end]]
-    length = float(np.linalg.norm(ends[1] - ends[0]))
-    return Measurement(length, "m", f"the edge is {measured(length, 'm')} long", ends)
-
-
-def measure_face(solid: Polyhedron, at: FaceAt) -> Measurement:
-    """The area of a face of the solid; the line is its normal, 10 mm long. Raises BadInput when none is there."""
-    f = face_at(solid, at)
-    area = float(solid.face_polygon(f, solid.face_frame(f)).area)
-    return Measurement(area, "m²", f"the face has {measured(area, 'm²')}", np.array([at.point, at.point + 0.01 * solid.normals[f]]))
 
 
 def _from_point(a: Reference, point: NDArray, off_parallel: float = 0.0) -> Measurement:
