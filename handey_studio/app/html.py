@@ -27,7 +27,7 @@ def card(title: str, text: str, tone: str = "info", testid: str = "") -> str:
 def facts(rows: Iterable[tuple[str, str]], testid: str = "") -> str:
     """Names and values, one a line."""
     lines = "".join(
-        f'<tr><td style="color:#6b7684;padding:1.5px 10px 1.5px 0;white-space:nowrap;vertical-align:top">{esc(name)}</td>'
+        f'<tr><td style="color:var(--muted);padding:1.5px 10px 1.5px 0;white-space:nowrap;vertical-align:top">{esc(name)}</td>'
         f'<td style="padding:1.5px 0;font-variant-numeric:tabular-nums">{esc(value)}</td></tr>'
         for name, value in rows
     )
@@ -37,8 +37,8 @@ def facts(rows: Iterable[tuple[str, str]], testid: str = "") -> str:
 def empty(text: str, testid: str = "") -> str:
     """What an empty pane says: how to fill it."""
     return (
-        f'<div data-testid="{esc(testid)}" style="margin:10px 14px;padding:14px;border:1px dashed #c3cad3;border-radius:6px;'
-        f'color:#6b7684;font-size:12.5px;line-height:1.45;text-align:center">{esc(text)}</div>'
+        f'<div data-testid="{esc(testid)}" style="margin:10px 14px;padding:14px;border:1px dashed var(--rim);border-radius:6px;'
+        f'color:var(--muted);font-size:12.5px;line-height:1.45;text-align:center">{esc(text)}</div>'
     )
 
 
@@ -65,7 +65,7 @@ def count_row(label: str, count: int, most: int, colour: palette.RGB) -> str:
     return (
         '<div style="display:flex;align-items:center;gap:8px;margin:2px 0">'
         f'<div style="flex:0 0 62%;line-height:1.25">{esc(label)}</div>'
-        f'<div style="flex:1;background:#e6eaef;border-radius:3px">{bar}</div>'
+        f'<div style="flex:1;background:var(--track);border-radius:3px">{bar}</div>'
         f'<div style="flex:0 0 48px;text-align:right;font-variant-numeric:tabular-nums">{count}</div></div>'
     )
 

@@ -98,6 +98,16 @@ class ToggleLayer:
 
 
 @dataclass(frozen=True)
+class SetDark:
+    """Show the page light on dark, or dark on light."""
+
+    dark: bool
+
+    def apply(self, state: State) -> State:
+        return replace(state, dark=self.dark)
+
+
+@dataclass(frozen=True)
 class Select:
     """Look at one data edge or result; -1 for none (the last result)."""
 

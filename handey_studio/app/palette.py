@@ -79,6 +79,16 @@ def css(colour: Sequence[float]) -> str:
     return "#{:02x}{:02x}{:02x}".format(*(int(c) for c in colour))
 
 
+def text(colour: Sequence[float]) -> str:
+    """The colour of words and signs that tell a meaning by colour: as it is, lighter on the dark page."""
+    return f"color-mix(in srgb, {css(colour)}, #fff var(--lift))"
+
+
+def words_on(colour: Sequence[float]) -> str:
+    """White or ink, whichever is the easier to read on a colour."""
+    return "#fff" if float(np.dot(colour, (0.2126, 0.7152, 0.0722))) < 120.0 else css(INK)
+
+
 def elevation_colours(share: NDArray) -> NDArray:
     """Colours (n, 3) uint8 for elevations (n,) as shares of the highest, in [0, 1]."""
     return _between(share, ELEVATION_AT, ELEVATION)

@@ -84,7 +84,7 @@ class State:
     `chosen` is the place in the list of the command that is set up, -1 for the last. `calibration` is
     one that was neither accepted nor discarded yet, `outcomes` are the MOVEs carried out since the session was opened. `left_behind` is a
     working copy of an earlier run that waits for a word of the user's,
-    `taken_up` whether this session is one.
+    `taken_up` whether this session is one. `dark`: whether the page is.
     """
 
     library: Library
@@ -99,6 +99,7 @@ class State:
     playing: bool = False
     speed: float = 1.0
     loop: bool = False
+    dark: bool = False
     notices: tuple[Notice, ...] = ()
     viewers: int = 0
     ledger_stage: str = ""
@@ -235,7 +236,7 @@ def opened(library: Library, session: Session, path: Path | None, before: State 
     state = State(library, session, robot, saved=session if path else None, path=path, chosen=last_run(session))
     if before is None:
         return state
-    here = {"viewers": before.viewers, "speed": before.speed, "left_behind": before.left_behind}
+    here = {"viewers": before.viewers, "speed": before.speed, "left_behind": before.left_behind, "dark": before.dark}
     return replace(state, jobs=before.jobs, notices=before.notices, loads=before.loads + 1, **here)
 
 

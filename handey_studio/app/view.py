@@ -59,7 +59,6 @@ class View:
 
     def __init__(self, server: viser.ViserServer, send: Send) -> None:
         self._server = server
-        server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
         scenes: list[Pane] = [WorkcellScene(server), RobotScene(server), PlannedArmScene(server)]
         scenes += [DepthScene(server), PartsScene(server, send)]
         scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), HypothesisScene(server)]
@@ -79,6 +78,8 @@ class View:
         of_move = (None if old is None else aside(looking_back(old)), aside(looking_back(new)))
         broken = []
         with self._server.atomic():
+            if old is None or old.dark != new.dark:
+                self._server.gui.configure_theme(dark_mode=new.dark, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
             for pane, states in [*((pane, of_move) for pane in self._of_move), *((pane, (old, new)) for pane in self._panes)]:
                 try:
                     pane.render(*states)

@@ -27,7 +27,7 @@ class CalibrationPanel:
     """Top to bottom: how, start, progress, what was found, what becomes of it."""
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
-        gui.add_html(f'<div style="margin:0 14px 4px;font-size:12px;line-height:1.4;color:#6b7684">{HOW}</div>')
+        gui.add_html(f'<div style="margin:0 14px 4px;font-size:12px;line-height:1.4;color:var(--muted)">{HOW}</div>')
         self._misplaced = gui.add_checkbox("Misplaced", False, hint=MISPLACED_HINT)
         self._poses: Any = gui.add_number("Poses", 10, min=3, max=100, step=1)
         self._start = gui.add_button("Calibrate", icon=viser.Icon.CUBE, color=palette.ARM_DARK)
@@ -76,11 +76,11 @@ def outcomes_html(outcomes: Sequence[Outcome]) -> str:
     """The MOVEs of this session side by side: a row each, the last one first."""
     if not outcomes:
         return ""
-    head = _row(("finder", "MOVE", "tries", "noticed", "seen off", "truly off"), "color:#6b7684")
+    head = _row(("finder", "MOVE", "tries", "noticed", "seen off", "truly off"), "color:var(--muted)")
     rows = "".join(_row(_words(one)) + _why(one) for one in reversed(outcomes))
     note = "Off its command, as the scan afterwards saw it, and truly: known only because the cell is simulated."
     style = "margin:2px 14px 6px;font-size:11px;line-height:1.35;font-variant-numeric:tabular-nums"
-    table = f'<table>{head}{rows}</table><div style="color:#6b7684">{note}</div>'
+    table = f'<table>{head}{rows}</table><div style="color:var(--muted)">{note}</div>'
     return f'{html.heading("MOVEs before and after")}<div data-testid="outcomes" style="{style}">{table}</div>'
 
 
@@ -90,7 +90,7 @@ def _words(one: Outcome) -> tuple[str, ...]:
 
 
 def _why(one: Outcome) -> str:
-    return f'<tr><td></td><td colspan="5" style="color:#6b7684">{html.esc(one.reason)}</td></tr>' if one.status == "failed" else ""
+    return f'<tr><td></td><td colspan="5" style="color:var(--muted)">{html.esc(one.reason)}</td></tr>' if one.status == "failed" else ""
 
 
 def _row(words: Sequence[str], look: str = "") -> str:
@@ -111,9 +111,9 @@ def residuals_svg(fit: FrameFit) -> str:
     bars = "".join(_bar(k, float(size), bool(used), across) for k, (size, used) in enumerate(zip(sizes, fit.used, strict=True)))
     height, at = ROW * len(sizes) + 14.0, LEFT + across * limit
     line = f'<line x1="{at:.1f}" x2="{at:.1f}" y1="0" y2="{height - 13:.0f}" stroke="{css(palette.VERMILLION)}" stroke-dasharray="3 2"/>'
-    told = f'<text x="{at:.1f}" y="{height - 3:.0f}" font-size="9" text-anchor="middle" fill="#55606e">outlier from {limit:g} mm</text>'
+    told = f'<text x="{at:.1f}" y="{height - 3:.0f}" font-size="9" text-anchor="middle" fill="var(--body)">outlier from {limit:g} mm</text>'
     title = '<div style="font-size:12px;margin-bottom:2px">Residual of each pose (mm)</div>'
-    svg = f'<svg viewBox="0 0 {WIDTH:g} {height:g}" width="100%" style="background:#f7f9fb;border-radius:4px">{bars}{line}{told}</svg>'
+    svg = f'<svg viewBox="0 0 {WIDTH:g} {height:g}" width="100%" style="background:var(--row);border-radius:4px">{bars}{line}{told}</svg>'
     return f'<div data-testid="residuals" style="margin:6px 14px">{title}{svg}</div>'
 
 
@@ -122,7 +122,7 @@ def _bar(number: int, size: float, used: bool, across: float) -> str:
     look = f'fill="{colour}"' if used else f'fill="none" stroke="{colour}"'
     end = LEFT + across * size
     return (
-        f'<text x="{LEFT - 6:g}" y="{y + 11:g}" font-size="10" text-anchor="end" fill="#55606e">{number + 1}</text>'
+        f'<text x="{LEFT - 6:g}" y="{y + 11:g}" font-size="10" text-anchor="end" fill="var(--body)">{number + 1}</text>'
         f'<rect x="{LEFT:g}" y="{y + 3:g}" width="{max(end - LEFT, 1.0):.1f}" height="{ROW - 5:g}" {look}/>'
-        f'<text x="{end + 4:.1f}" y="{y + 11:g}" font-size="10" fill="#202935">{size:.2f}{"" if used else " left out"}</text>'
+        f'<text x="{end + 4:.1f}" y="{y + 11:g}" font-size="10" fill="var(--ink)">{size:.2f}{"" if used else " left out"}</text>'
     )

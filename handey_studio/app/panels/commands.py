@@ -77,18 +77,18 @@ def commands_html(state: State, first: int, buttons: Sequence[str]) -> str:
     rows = "".join(_row(state, number, states[number], button) for number, button in zip(shown, buttons, strict=False))
     over = sum(one.status in ("done", "skipped") for one in states)
     more = f", {shown.start + 1} to {shown.stop} are shown" if len(shown) < len(states) else ""
-    head = f'<div style="color:#6b7684;margin:0 2px 3px">{over} of {len(states)} done{more}</div>'
+    head = f'<div style="color:var(--muted);margin:0 2px 3px">{over} of {len(states)} done{more}</div>'
     return f'{hidden}<div data-testid="commands" style="margin:2px 12px 4px;font-size:12px;line-height:1.35">{head}{rows}</div>'
 
 
 def _row(state: State, number: int, told: CommandState, button: str) -> str:
     command, chosen = state.session.commands[number], number == state.command_number
     sign, colour = SIGNS[told.status]
-    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:#e3e8ee"
+    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:var(--line)"
     clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     why = state.session.results[told.result].reason if told.result >= 0 else ""
     below = (
-        f'<div style="color:{css(palette.VERMILLION)};padding-left:34px;font-size:11.5px;{TWO_LINES}">{html.esc(why)}</div>'
+        f'<div style="color:{palette.text(palette.VERMILLION)};padding-left:34px;font-size:11.5px;{TWO_LINES}">{html.esc(why)}</div>'
         if told.status == "failed"
         else ""
     )
@@ -96,8 +96,8 @@ def _row(state: State, number: int, told: CommandState, button: str) -> str:
     return (
         f'<div data-testid="command-{number}" data-status="{told.status}" role="button" tabindex="0" title="{words}: {told.status}" '
         f'onclick="{html.esc(html.pressing(button))}" style="cursor:pointer;border-left:3px solid;{look};padding:2px 8px">'
-        f'<div style="display:flex;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span>'
-        f'<span style="color:#8a94a0;width:16px">{number + 1}</span><span style="flex:1;{clipped}">{words}</span></div>{below}</div>'
+        f'<div style="display:flex;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
+        f'<span style="color:var(--faint);width:16px">{number + 1}</span><span style="flex:1;{clipped}">{words}</span></div>{below}</div>'
     )
 
 

@@ -79,4 +79,4 @@ def faults_html(state: State) -> str:
 
 
 def _small(text: str, testid: str = "") -> str:
-    return f'<div data-testid="{testid}" style="margin:0 14px 4px;font-size:12px;line-height:1.4;color:#6b7684">{html.esc(text)}</div>'
+    return f'<div data-testid="{testid}" style="margin:0 14px 4px;font-size:12px;line-height:1.4;color:var(--muted)">{html.esc(text)}</div>'

@@ -7,7 +7,6 @@ import viser
 from handey_studio.app import html, palette
 from handey_studio.app.browsing import edges_shown
 from handey_studio.app.looking_at import FilterEdges, Select
-from handey_studio.app.palette import css
 from handey_studio.app.panels.move import choose
 from handey_studio.app.scene.sensing import KIND_COLOURS, chosen_edge
 from handey_studio.app.state import State
@@ -71,8 +70,8 @@ def edges_legend(state: State) -> str:
     for kind, colour in KIND_COLOURS.items():
         count, total = (sum(edge.kind == kind for edge in some) for some in (shown, edges))
         of = "" if count == total else f" of {total}"
-        line = f'<span style="width:22px;height:4px;border-radius:2px;background:{css(colour)}"></span>'
-        words = f'<b style="font-weight:600">{count}{of} {kind}</b><span style="color:#6b7684">{MEANING[kind]}</span>'
+        line = f'<span style="width:22px;height:4px;border-radius:2px;background:{palette.text(colour)}"></span>'
+        words = f'<b style="font-weight:600">{count}{of} {kind}</b><span style="color:var(--muted)">{MEANING[kind]}</span>'
         rows += f'<div style="display:flex;align-items:center;gap:8px">{line}{words}</div>'
     return f'<div data-testid="edges" style="margin:6px 14px;font-size:12.5px;line-height:1.6">{rows}</div>'
 

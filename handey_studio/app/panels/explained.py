@@ -58,8 +58,8 @@ def _residuals(said: Explanation) -> str:
     rms = "none is within the limit" if said.rms_m is None else f"{1e3 * said.rms_m:.2f} mm rms of those within the limit"
     return (
         _head("Residuals of readings to the model")
-        + f'<div style="height:9px;border-radius:3px;border:1px solid #dde2e8;background:linear-gradient(90deg,{stops})"></div>'
-        + f'<div style="display:flex;justify-content:space-between;color:#6b7684">{ticks}</div>'
+        + f'<div style="height:9px;border-radius:3px;border:1px solid var(--line);background:linear-gradient(90deg,{stops})"></div>'
+        + f'<div style="display:flex;justify-content:space-between;color:var(--muted)">{ticks}</div>'
         + _note(f"{len(said.distance)} readings; {rms}.")
     )
 
@@ -72,7 +72,7 @@ def _pair(said: Explanation, numbers: Sequence[int]) -> str:
     cell = "padding:1px 14px 1px 0;font-variant-numeric:tabular-nums"
     heads = (html.swatch(DATA, f"data {' and '.join(map(str, numbers))}"), html.swatch(MODEL, "model"))
     lines = "".join(
-        f'<tr><td style="{cell};color:#6b7684">{html.esc(name)}</td><td style="{cell}">{html.esc(data)}</td>'
+        f'<tr><td style="{cell};color:var(--muted)">{html.esc(name)}</td><td style="{cell}">{html.esc(data)}</td>'
         f'<td style="{cell}">{html.esc(model or "not kept")}</td></tr>'
         for name, data, model in rows
     )
@@ -86,7 +86,8 @@ def _stacked(values: NDArray, colours: Sequence[palette.RGB], words: Sequence[st
     total = max(float(sum(values)), 1e-12)
     bar = "".join(f'<span style="width:{100 * v / total:.2f}%;background:{css(c)}"></span>' for v, c in zip(values, colours, strict=True))
     chips = "".join(html.swatch(colour, word) for colour, word in zip(colours, words, strict=True))
-    return f'<div style="display:flex;height:9px;border-radius:3px;overflow:hidden;background:#e6eaef;margin:1px 0 2px">{bar}</div>{chips}'
+    look = "display:flex;height:9px;border-radius:3px;overflow:hidden;background:var(--track);margin:1px 0 2px"
+    return f'<div style="{look}">{bar}</div>{chips}'
 
 
 def _head(text: str) -> str:
@@ -94,4 +95,4 @@ def _head(text: str) -> str:
 
 
 def _note(text: str) -> str:
-    return f'<div style="color:#6b7684">{html.esc(text)}</div>'
+    return f'<div style="color:var(--muted)">{html.esc(text)}</div>'

@@ -68,7 +68,7 @@ def ledger_html(state: State, buttons: Sequence[str]) -> str:
     where = f"{len(every)} of {len(entries)} entries match; {head}" if filtered(state) else f"{_trail(state)}: {head}"
     return (
         f'{html.hidden(buttons)}<div data-testid="ledger" style="margin:4px 14px;font-size:12px;line-height:1.4">{bars}'
-        f'<div style="color:#6b7684;margin:8px 0 3px">{where}</div>{rows}</div>'
+        f'<div style="color:var(--muted);margin:8px 0 3px">{where}</div>{rows}</div>'
     )
 
 
@@ -82,17 +82,17 @@ def _row(entry: Entry, below: tuple[int, int], looked_at: bool, button: str) -> 
     """A mark that says whether it fell, the option, how much was tried below it, and the reason with value and limit."""
     fell = entry.reason is not None
     colour, sign = (palette.VERMILLION, "✕") if fell else (palette.TEAL, "●")
-    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if looked_at else "border-left-color:#e3e8ee"
-    more = f'<span style="color:#6b7684;white-space:nowrap">{below[0]} ▸</span>' if below[0] else ""
+    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if looked_at else "border-left-color:var(--line)"
+    more = f'<span style="color:var(--muted);white-space:nowrap">{below[0]} ▸</span>' if below[0] else ""
     stood = f"{below[1]} of {below[0]} below it fell" if below[0] else STOOD.get(entry.stage, "nothing speaks against it")
     said = html.esc(describe(entry) or stood)
     return (
         f'<div data-testid="entry-{entry.id}" role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}" '
         f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
-        f'<div style="display:flex;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span>'
-        f'<span style="flex:1;overflow-wrap:anywhere"><span style="color:#8a94a0">{html.esc(entry.stage)}</span> '
+        f'<div style="display:flex;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
+        f'<span style="flex:1;overflow-wrap:anywhere"><span style="color:var(--faint)">{html.esc(entry.stage)}</span> '
         f"{html.esc(entry.option)}</span>"
-        f'{more}</div><div style="color:#6b7684;padding-left:18px;font-size:11.5px">{said}</div></div>'
+        f'{more}</div><div style="color:var(--muted);padding-left:18px;font-size:11.5px">{said}</div></div>'
     )
 
 

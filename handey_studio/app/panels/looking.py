@@ -3,7 +3,7 @@
 import viser
 
 from handey_studio.app import html, palette
-from handey_studio.app.looking_at import ShowLayer
+from handey_studio.app.looking_at import SetDark, ShowLayer
 from handey_studio.app.palette import ELEVATION, ELEVATION_AT
 from handey_studio.app.scene.depth import elevation_span
 from handey_studio.app.state import State
@@ -21,6 +21,8 @@ class LookingPanel:
         for label, views in VIEWS:
             on_click(gui.add_button_group(label, views), send, lambda event: LookFrom(event.target.value, event.client_id))
         self._legend = gui.add_html("")
+        self._dark = gui.add_checkbox("Dark page", False, hint="For everyone who looks at this workbench")
+        on_user(self._dark, send, lambda event: SetDark(bool(event.target.value)))
         self._layers = {}
         with gui.add_folder("Show", expand_by_default=True):
             for layer in LAYERS:
@@ -29,6 +31,7 @@ class LookingPanel:
                 self._layers[layer] = box
 
     def render(self, old: State | None, new: State) -> None:
+        set_to(self._dark, value=new.dark)
         hidden = new.session.view.hidden_layers
         if old is None or old.session.view.hidden_layers != hidden:
             for layer, box in self._layers.items():

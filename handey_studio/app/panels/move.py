@@ -154,7 +154,7 @@ def _about_destination(free: bool, known: bool, command: MoveCommand | None) -> 
     text = "It goes where it fits onto that part." if known else "The ghost appears once that part is located."
     if command.to.startswith("in:"):
         text = "It goes to a free place in this area of the table (x and y from, x and y to, in metres), standing as it may."
-    return f'<div style="margin:0 14px 4px;font-size:12px;color:#6b7684">{html.esc(text)}</div>'
+    return f'<div style="margin:0 14px 4px;font-size:12px;color:var(--muted)">{html.esc(text)}</div>'
 
 
 def _looks(state: State) -> tuple:

@@ -141,7 +141,7 @@ def _finding(number: int, check: Check, chosen: bool, field: str) -> str:
     return (
         f'<div role="button" tabindex="0" data-testid="check-{number}" onclick="{html.esc(html.picking(field, str(number)))}" '
         f'style="cursor:pointer;border-left:3px solid {colour};padding:3px 8px;margin-bottom:2px;{look}">'
-        f'{html.esc(check.sentence)} <span style="color:#6b7684">{html.esc(check.fix)}</span></div>'
+        f'{html.esc(check.sentence)} <span style="color:var(--muted)">{html.esc(check.fix)}</span></div>'
     )
 
 
@@ -151,7 +151,7 @@ def grasps_html(found: Graspable | None) -> str:
         return ""
     cards = "".join(_grasp(found, place) for place in range(min(len(found.classes), MOST_GRASPS)))
     left = len(found.classes) - MOST_GRASPS
-    more = f'<div style="color:#6b7684;font-size:11.5px">and {left} more; all are in Grasp once it is found</div>' if left > 0 else ""
+    more = f'<div style="color:var(--muted);font-size:11.5px">and {left} more; all are in Grasp once it is found</div>' if left > 0 else ""
     grid = f'<div style="display:grid;grid-template-columns:repeat(3,1fr);gap:6px">{cards}</div>'
     return f'<div data-testid="part-grasps" style="margin:4px 12px">{grid}{more}</div>'
 
@@ -162,7 +162,7 @@ def _grasp(found: Graspable, place: int) -> str:
     picture = class_svg(found.part, grasp_class, [(group, OPEN) for group in groups], view)
     words = f"{grasp_class.name}: {len(groups)} approach groups"
     return (
-        f'<div title="{html.esc(words)}" style="border:1px solid #dde2e8;border-radius:6px;overflow:hidden">{picture}'
+        f'<div title="{html.esc(words)}" style="border:1px solid var(--line);border-radius:6px;overflow:hidden">{picture}'
         f'<div style="font-size:11px;text-align:center;padding:1px 3px 2px;{CLIPPED}">{html.esc(grasp_class.name)}</div></div>'
     )
 
@@ -177,15 +177,17 @@ def history_html(steps: Sequence[Step], looked_at: int | None, field: str) -> st
 
 def _step(step: Step, chosen: bool, field: str) -> str:
     colour, sign = (palette.VERMILLION, "✕") if step.reason else (palette.TEAL, "✓")
-    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:#e3e8ee"
+    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:var(--line)"
     words = f'<span style="flex:1;{CLIPPED}" title="{html.esc(step.told)}">{html.esc(step.told)}</span>'
-    why = f'<div style="color:{css(colour)};padding-left:34px;font-size:11.5px">{html.esc(step.reason)}</div>' if step.reason else ""
+    why = (
+        f'<div style="color:{palette.text(colour)};padding-left:34px;font-size:11.5px">{html.esc(step.reason)}</div>' if step.reason else ""
+    )
     return (
         f'<div data-testid="step-{step.number}" role="button" tabindex="0" aria-pressed="{str(chosen).lower()}" '
         f'onclick="{html.esc(html.picking(field, str(step.number)))}" '
         f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
-        f'<div style="display:flex;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span>'
-        f'<span style="color:#8a94a0;width:16px">{step.number + 1}</span>{words}</div>{why}</div>'
+        f'<div style="display:flex;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
+        f'<span style="color:var(--faint);width:16px">{step.number + 1}</span>{words}</div>{why}</div>'
     )
 
 
@@ -199,7 +201,7 @@ def library_html(parts: Sequence[Part], chosen: str, drafts: Sequence[str], fiel
 
 def _thumbnail(number: int, part: Part, chosen: bool, has_draft: bool, field: str) -> str:
     blue = css(palette.BLUE)
-    look = f"border-color:{blue};background:{blue}14" if chosen else "border-color:#dde2e8;background:#fbfcfd"
+    look = f"border-color:{blue};background:{blue}14" if chosen else "border-color:var(--line);background:var(--row)"
     size = " × ".join(measured(float(side), "m").removesuffix(" mm") for side in np.ptp(part.solid.vertices, axis=0))
     return (
         f'<div data-testid="part-{html.esc(part.name)}" role="button" tabindex="0" title="{html.esc(f"{part.name}: {size} mm")}" '

@@ -25,32 +25,32 @@ def hypothesis_rows(scene: Scene, page: Sequence[int], listed: Sequence[int], ch
     head = f"{first} to {first + len(page) - 1} of {len(listed)}, best first; click one"
     return (
         f'{html.hidden(buttons)}<div data-testid="hypotheses" style="margin:2px 12px 6px;font-size:12px;line-height:1.3">'
-        f'<div style="color:#6b7684;margin:0 2px 3px">{head}</div>{rows}</div>'
+        f'<div style="color:var(--muted);margin:0 2px 3px">{head}</div>{rows}</div>'
     )
 
 
 def _row(scene: Scene, number: int, chosen: bool, button: str) -> str:
     hypothesis = scene.located.hypotheses[number]
     colour, sign = (palette.VERMILLION, "✕") if hypothesis.reason else (palette.TEAL, "●")
-    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:#e3e8ee"
+    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:var(--line)"
     click = f' role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}"' if button else ""
     clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     said = html.esc(reason_of(scene, hypothesis))
     return (
         f'<div data-testid="hypothesis-{number}"{click} aria-pressed="{str(chosen).lower()}" '
         f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
-        f'<div style="display:flex;align-items:center;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span>'
-        f'<span style="color:#8a94a0;width:16px">{number + 1}</span>'
+        f'<div style="display:flex;align-items:center;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
+        f'<span style="color:var(--faint);width:16px">{number + 1}</span>'
         f'<b style="font-weight:600;flex:1;{clipped}">{html.esc(hypothesis.part)}</b>{_bar(hypothesis, colour)}'
         f'<span style="width:40px;text-align:right;font-variant-numeric:tabular-nums">{percent(hypothesis.score)}</span></div>'
-        f'<div style="color:#6b7684;padding-left:18px;font-size:11.5px">{said}</div></div>'
+        f'<div style="color:var(--muted);padding-left:18px;font-size:11.5px">{said}</div></div>'
     )
 
 
 def _bar(hypothesis: Hypothesis, colour: palette.RGB) -> str:
     width = 100.0 * min(max(hypothesis.score, 0.0), 1.0)
     return (
-        '<span style="width:64px;height:7px;background:#e6eaef;border-radius:3px;display:inline-block">'
+        '<span style="width:64px;height:7px;background:var(--track);border-radius:3px;display:inline-block">'
         f'<span style="display:block;width:{width:.0f}%;height:7px;border-radius:3px;background:{css(colour)}"></span></span>'
     )
 

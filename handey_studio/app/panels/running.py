@@ -73,10 +73,11 @@ def _row(row: Happening, count: int, number: int, button: str) -> str:
     return (
         f'<div data-testid="happened-{number}" role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}" '
         f'style="cursor:pointer;border-left:3px solid {css(colour)};padding:3px 8px;margin-bottom:3px;border-radius:3px;'
-        f'background:#f7f9fb">'
-        f'<div style="display:flex;gap:6px"><span style="color:{css(colour)};width:12px">{sign}</span><b style="font-weight:600;flex:1">'
-        f'{html.esc(row.title)}</b><span style="color:#6b7684;white-space:nowrap">{when}</span></div>'
-        f'<div style="color:#4a5562;padding-left:18px;font-size:11.5px">{html.esc(html.sentence(row.sentence))}</div></div>'
+        f'background:var(--row)">'
+        f'<div style="display:flex;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
+        f'<b style="font-weight:600;flex:1">{html.esc(row.title)}</b>'
+        f'<span style="color:var(--muted);white-space:nowrap">{when}</span></div>'
+        f'<div style="color:var(--body);padding-left:18px;font-size:11.5px">{html.esc(html.sentence(row.sentence))}</div></div>'
     )
 
 

@@ -96,7 +96,7 @@ class SessionPanel:
             return
         mark = " *" if new.unsaved else ""
         self._server.gui.set_panel_label(f"Handey Studio – {new.session.name}{mark}")
-        model = f'<div style="margin:0 14px 4px;font-size:12px;color:#6b7684">{MODEL_OPEN}</div>' if new.modelling else ""
+        model = f'<div style="margin:0 14px 4px;font-size:12px;color:var(--muted)">{MODEL_OPEN}</div>' if new.modelling else ""
         self._about.content = html.facts(_about(new), "session-about") + model
 
 

@@ -6,7 +6,7 @@ import viser
 
 from handey_studio.app import html
 from handey_studio.app.looking_at import ToggleLayer
-from handey_studio.app.palette import STEP_COLOURS, css
+from handey_studio.app.palette import STEP_COLOURS, css, words_on
 from handey_studio.app.pictures.plots import cursor, now_words, plots_html
 from handey_studio.app.playback import Seek, SeekStep, SetPlayback, TogglePlay
 from handey_studio.app.state import State
@@ -86,14 +86,18 @@ def strip(state: State, field: str = "") -> str:
     if replay is None:
         return ""
     total, now = max(replay.duration, 1e-9), replay.stretch_at(time_s)
-    boxes = "".join(_box(stretch, stretch is now, total) for stretch in replay.stretches)
-    at = f'<div style="position:absolute;left:{100 * time_s / total:.3f}%;top:-3px;bottom:-3px;width:2px;background:#202935"></div>'
-    bar = "position:relative;display:flex;height:22px;line-height:22px;color:#fff;font-size:11px;cursor:pointer"
+    before = (None, *replay.stretches)
+    boxes = "".join(_box(s, s is now, total, b is None or b.step != s.step) for s, b in zip(replay.stretches, before, strict=False))
+    line = f"position:absolute;left:{100 * time_s / total:.3f}%;top:-3px;bottom:-3px;width:2px;background:var(--ink)"
+    at = f'<div style="{line};pointer-events:none"></div>'
+    bar = "position:relative;display:flex;height:22px;line-height:22px;font-size:11px;cursor:pointer"
     line = "display:flex;justify-content:space-between;font-size:12px;margin-top:5px;font-variant-numeric:tabular-nums;white-space:nowrap"
     click = html.esc(html.picking_share(field, total))
     said = f'<span data-testid="step-name">{html.esc(now_playing(state))}</span><span>{state.speed:g}×</span>'
     performed = isinstance(replay, PerformedReplay)
-    measured = f'<div data-testid="measured" style="{line};color:#55606e">{html.esc(now_words(replay, time_s))}</div>' if performed else ""
+    measured = (
+        f'<div data-testid="measured" style="{line};color:var(--body)">{html.esc(now_words(replay, time_s))}</div>' if performed else ""
+    )
     return (
         f'<div data-testid="timeline" style="margin:6px 14px 2px"><div style="{bar}" onclick="{click}">{boxes}{at}</div>'
         f'<div style="{line}">{said}</div>{measured}</div>'
@@ -113,15 +117,16 @@ def now_playing(state: State) -> str:
     return f"{'▶' if state.playing else '❚❚'} {moment.time_s:.2f} of {replay.duration:.2f} s · {attempt}{step}{held}"
 
 
-def _box(stretch: Stretch, now: bool, total: float) -> str:
-    """A stretch with its name, where that is too long with the step's number, as far as either fits."""
+def _box(stretch: Stretch, now: bool, total: float, first: bool) -> str:
+    """A stretch with its name, where that is too long with the step's number if it is its `first` stretch, as far as either fits."""
     share = 100.0 * (stretch.end - stretch.start) / total
-    words = (stretch.what, "" if stretch.back else str(stretch.step + 1), "")
+    words = (stretch.what, "" if stretch.back or not first else str(stretch.step + 1), "")
     name = next(word for word in words if share > 100 * LETTER * len(word) / (WIDTH - 40) or not word)
-    colour = css(STEP_COLOURS.get(stretch.what.split(",")[0], STEP_COLOURS[OTHER]))
+    colour = STEP_COLOURS.get(stretch.what.split(",")[0], STEP_COLOURS[OTHER])
+    look = f"background:{css(colour)};color:{words_on(colour)};font-weight:650" if now else f"background:{css(colour)}55"
     return (
-        f'<div title="{html.esc(stretch.what)} {stretch.end - stretch.start:.1f} s" style="width:{share:.3f}%;background:{colour};'
-        f'opacity:{1.0 if now else 0.55};overflow:hidden;white-space:nowrap;text-align:center;border-right:1px solid #fff">'
+        f'<div title="{html.esc(stretch.what)} {stretch.end - stretch.start:.1f} s" style="width:{share:.3f}%;{look};'
+        f'overflow:hidden;white-space:nowrap;text-align:center;border-right:1px solid var(--mantine-color-body)">'
         f"{html.esc(name)}</div>"
     )
 

@@ -30,7 +30,9 @@ def toolbar(active: str, usable: tuple[str, ...], field: str) -> str:
 def _chip(number: int, tool: str, active: bool, usable: bool, field: str) -> str:
     label, hint = LABELS[tool]
     blue = css(palette.BLUE)
-    look = f"background:{blue};color:#fff;border-color:{blue}" if active else "background:#fff;color:#202935;border-color:#ccd3db"
+    look = (
+        f"background:{blue};color:#fff;border-color:{blue}" if active else "background:var(--row);color:var(--ink);border-color:var(--rim)"
+    )
     click = f'onclick="{html.esc(html.picking(field, str(number)))}"' if usable else "disabled"
     return (
         f'<button type="button" data-testid="tool-{tool}" aria-pressed="{str(active).lower()}" title="{html.esc(hint)}" {click} '

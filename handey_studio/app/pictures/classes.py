@@ -78,9 +78,10 @@ def _card(told: Handling, number: int, place: int, entries: Mapping[str, Entry],
     return (
         f'<div data-testid="class-{number}" role="button" tabindex="0" aria-pressed="{str(looked_at).lower()}" '
         f'onclick="{html.esc(html.picking(picker, str(number)))}" title="{html.esc(seen)}" style="cursor:pointer;overflow:hidden;'
-        f'border:1.5px solid {css(border)};{shade}border-radius:6px;background:#fff">{class_svg(told.part, grasp_class, groups, view)}'
+        f'border:1.5px solid {css(border)};{shade}border-radius:6px;background:var(--row)">'
+        f"{class_svg(told.part, grasp_class, groups, view)}"
         f'<div style="padding:2px 7px 5px;line-height:1.3"><b style="font-weight:650">{place + 1}. {html.esc(grasp_class.name)}</b>'
-        f'<div style="color:#6b7684;font-size:11px">{html.esc(said)}</div></div></div>'
+        f'<div style="color:var(--muted);font-size:11px">{html.esc(said)}</div></div></div>'
     )
 
 
@@ -96,8 +97,9 @@ def _group_row(group: GraspGroup, entries: Mapping[str, Entry], chosen: str) -> 
     sign = {CHOSEN: "★", STOOD: "●", FELL: "✕", OPEN: "○"}[fate]
     name = group.name.removeprefix(group.grasp_class.name + ", ")
     why = describe(entries[group.name]) if fate == FELL else fate
-    mark = f'<span style="color:{css(COLOURS[fate])};display:inline-block;width:16px">{sign}</span>{html.esc(name)}'
-    return f'<div style="padding:1px 0;border-bottom:1px solid #eef1f4">{mark} <span style="color:#6b7684">{html.esc(why)}</span></div>'
+    mark = f'<span style="color:{palette.text(COLOURS[fate])};display:inline-block;width:16px">{sign}</span>{html.esc(name)}'
+    said = f'<span style="color:var(--muted)">{html.esc(why)}</span>'
+    return f'<div style="padding:1px 0;border-bottom:1px solid var(--line)">{mark} {said}</div>'
 
 
 def _fallen(entries: Sequence[Entry]) -> str:
@@ -106,8 +108,8 @@ def _fallen(entries: Sequence[Entry]) -> str:
     if not fell:
         return ""
     rows = "".join(
-        f'<div style="padding:1px 0"><span style="color:{css(palette.VERMILLION)};display:inline-block;width:16px">✕</span>'
-        f'{html.esc(entry.option)}: <span style="color:#6b7684">{html.esc(describe(entry))}</span></div>'
+        f'<div style="padding:1px 0"><span style="color:{palette.text(palette.VERMILLION)};display:inline-block;width:16px">✕</span>'
+        f'{html.esc(entry.option)}: <span style="color:var(--muted)">{html.esc(describe(entry))}</span></div>'
         for entry in fell
     )
     head = f'<div style="font-weight:650;margin-top:6px">Fell before any scene was looked at ({len(fell)})</div>'

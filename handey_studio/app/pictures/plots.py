@@ -131,7 +131,7 @@ def _row(plot: Plot, times: NDArray, duration: float) -> str:
         f'<svg width="100%" height="{ROW}" viewBox="0 0 {WIDE:g} {ROW}" preserveAspectRatio="none" style="display:block;background:#f5f7f9;'
         f'border-radius:3px">{zero}{"".join(lines)}</svg>'
     )
-    words = f"display:flex;justify-content:space-between;font-size:10px;line-height:{WORDS}px;height:{WORDS}px;color:#55606e"
+    words = f"display:flex;justify-content:space-between;font-size:10px;line-height:{WORDS}px;height:{WORDS}px;color:var(--body)"
     most = f"at most {_number(max(np.abs(curve.values).max() for curve in plot.curves))} {plot.unit}"
     return (
         f'<div style="margin-bottom:{GAP}px"><div style="{words}"><span>{html.esc(plot.title)}</span><span>{most}</span></div>{svg}</div>'
@@ -162,7 +162,7 @@ def _marks(replay: PerformedReplay) -> str:
             side = f"right:{100 * (1 - share):.2f}%" if share > 0.9 else f"left:{100 * share:.2f}%"
             said = html.esc(f"{event.what} at {performed.start_s + event.time_s:.2f} s, {event.force_N:.1f} N")
             told.append(f'<span title="{said}" style="position:absolute;{side};transform:translateX(-3px)">{sign}{number}</span>')
-    style = f"position:relative;height:{MARKS}px;font-size:10px;line-height:{MARKS}px;color:{css(palette.TEAL)};white-space:nowrap"
+    style = f"position:relative;height:{MARKS}px;font-size:10px;line-height:{MARKS}px;color:{palette.text(palette.TEAL)};white-space:nowrap"
     return f'<div data-testid="contacts" style="{style}">{"".join(told)}</div>'
 
 

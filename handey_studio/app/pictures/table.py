@@ -95,7 +95,17 @@ def table_svg(told: Handling, layout: Layout, row: int | None, column: int | Non
         f'style="cursor:crosshair" onclick="{click}"/>'
     )
     marks = _classes(told, layout, height) + lines + _way(layout, way) + _mark(layout, row, column)
-    return svg("grasp-placement-table", "Grasp–placement table", WIDTH, height, cells, names, marks, area, style="width:100%;display:block")
+    return svg(
+        "grasp-placement-table",
+        "Grasp–placement table",
+        WIDTH,
+        height,
+        cells,
+        names,
+        marks,
+        area,
+        style="width:100%;display:block;background:#fbfcfd",
+    )
 
 
 def cell_words(told: Handling, row: int | None, column: int | None) -> str:

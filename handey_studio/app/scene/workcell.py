@@ -5,6 +5,7 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import palette
+from handey_studio.app.palette import RGB
 from handey_studio.app.scene.units import SCALE, place, scaled
 from handey_studio.app.state import State
 from handey_studio.cell import Workcell
@@ -13,6 +14,8 @@ from handey_studio.sensing.stripes.range_finder import RangeFinder
 
 TABLE_M = (1.3, 1.3, 0.03)
 TABLE_AT_M = (0.25, 0.0)
+LIGHT: tuple[RGB, RGB] = ((247, 249, 251), (219, 225, 232))  # behind everything, top and bottom
+DARK: tuple[RGB, RGB] = ((62, 70, 80), (30, 34, 40))
 
 
 class WorkcellScene:
@@ -26,6 +29,8 @@ class WorkcellScene:
 
     def render(self, old: State | None, new: State) -> None:
         self._root.visible = not new.modelling
+        if old is None or old.dark != new.dark:
+            self._server.scene.set_background_image(_backdrop(*(DARK if new.dark else LIGHT)), format="png")
         if old is not None and old.session.workcell is new.session.workcell:
             return
         scene, workcell = self._server.scene, new.session.workcell
@@ -49,14 +54,12 @@ def _light(server: viser.ViserServer) -> None:
     scene.add_light_hemisphere("/light/sky", sky_color=(255, 255, 255), ground_color=(196, 202, 210), intensity=1.15)
     scene.add_light_directional("/light/key", color=(255, 250, 242), intensity=1.5, position=(9.0, -7.0, 16.0), cast_shadow=False)
     scene.add_light_directional("/light/fill", color=(226, 236, 255), intensity=0.5, position=(-8.0, 9.0, 8.0), cast_shadow=False)
-    scene.set_background_image(_backdrop(), format="png")
 
 
-def _backdrop() -> np.ndarray:
+def _backdrop(top: RGB, bottom: RGB) -> np.ndarray:
     """A quiet vertical gradient."""
-    top, bottom = np.array([247.0, 249.0, 251.0]), np.array([219.0, 225.0, 232.0])
     share = np.linspace(0.0, 1.0, 256)[:, None, None]
-    return np.broadcast_to(top + share * (bottom - top), (256, 8, 3)).astype(np.uint8)
+    return np.broadcast_to((1.0 - share) * np.array(top) + share * np.array(bottom), (256, 8, 3)).astype(np.uint8)
 
 
 def _table(scene: viser.SceneApi, table_z: float) -> None:
