@@ -17,25 +17,31 @@ from handey_studio.base.errors import BadInput
 from handey_studio.base.files import replace_file
 
 GZIP_MAGIC = b"\x1f\x8b"
+MOST_VALUES = 2_000_000  # numbers, words and lists; large arrays are one each. A byte or two can take a hundred bytes of memory
 
 
 def packed(plain: dict[str, Any], most_bytes: int, told: str, fix: str) -> bytes:
     """The bytes of a document that `to_plain` made, the same for the same: JSON that a person can read, or gzipped if arrays are in it.
 
-    One of more than `most_bytes` is refused; the sentence begins with `told`, which names it, and ends with `fix`.
+    One of more than `most_bytes`, or of more than MOST_VALUES values, is refused; the sentence begins with `told`, which names it, and ends
+    with `fix`.
     """
     content = msgspec.json.encode(plain)
-    if len(content) > most_bytes:
-        raise BadInput(f"{told} holds {len(content)} bytes, the limit is {most_bytes}; {fix}.")
+    for found, limit, unit in ((len(content), most_bytes, "bytes"), (_values(content), MOST_VALUES, "values")):
+        if found > limit:
+            raise BadInput(f"{told} holds {found} {unit}, the limit is {limit}; {fix}.")
     if b'"base64"' not in content:
         return msgspec.json.format(content, indent=1) + b"\n"
     return gzip.compress(content, compresslevel=6, mtime=0)
 
 
 def unpacked(data: bytes, noun: str, most_file_bytes: int, most_bytes: int) -> Any:
-    """The JSON in a document's bytes, without ever inflating more than `most_bytes`."""
+    """The JSON in a document's bytes, without ever inflating more than `most_bytes` or making more than MOST_VALUES values of them."""
+    content = _inflated(data, noun, most_file_bytes, most_bytes)
+    if _values(content) > MOST_VALUES:
+        raise BadInput(f"it holds more than {MOST_VALUES} values, the limit for a {noun}.")
     try:
-        return msgspec.json.decode(_inflated(data, noun, most_file_bytes, most_bytes))
+        return msgspec.json.decode(content)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise BadInput(f"it is not valid JSON: {str(error).rstrip('.')}.") from None
 
@@ -71,6 +77,11 @@ def write_document(path: str | os.PathLike, suffix: str, data: bytes, noun: str)
         replace_file(path, data)
     except OSError as error:
         raise BadInput(f'{noun} "{path}" cannot be written: {error.strerror}.') from None
+
+
+def _values(content: bytes) -> int:
+    """At most how many values stand side by side in JSON: commas in words count too."""
+    return 1 + content.count(b",")
 
 
 def _inflated(data: bytes, noun: str, most_file_bytes: int, most_bytes: int) -> bytes:

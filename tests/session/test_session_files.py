@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from handey_studio.base import BadInput
+from handey_studio.base import BadInput, documents
 from handey_studio.base.coding import from_plain, plain_array, to_plain
 from handey_studio.base.documents import GZIP_MAGIC
 from handey_studio.session import files, find_session, own_file, read_session, session_from_bytes, session_to_bytes, write_session
@@ -175,6 +175,13 @@ def test_a_decompression_bomb_is_not_inflated(monkeypatch, full):
     assert len(bomb) < 100_000
     with pytest.raises(BadInput, match="unpacks to more than 1000000 bytes"):
         session_from_bytes(bomb, "x")
+
+
+def test_what_would_grow_a_hundredfold_in_memory_is_refused_unread(monkeypatch, fresh):
+    monkeypatch.setattr(documents, "MOST_VALUES", 20_000)
+    assert "more than 20000 values" in refused(plain_of(fresh) | {"name": [[]] * 20_000})
+    with pytest.raises(BadInput, match=r"holds 20001 values, the limit is 20000; take out a scan"):
+        documents.packed({"steps": [0] * 20_001}, 10**6, "it", "take out a scan")
 
 
 def test_a_file_over_the_limit_is_refused(monkeypatch, full, tmp_path):
