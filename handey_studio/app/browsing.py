@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from handey_studio.app.state import State
-from handey_studio.base import Entry
+from handey_studio.base import Entry, rejected_counts
 from handey_studio.session.ledger_tree import children_of
 from handey_studio.session.looking import browsed
 
@@ -46,15 +46,25 @@ def ledger_of(state: State) -> tuple[Entry, ...]:
 
 def filtered(state: State) -> bool:
     """Whether the ledger is a list of what was searched for, and not a tree."""
-    return bool(state.ledger_stage or state.ledger_words) or state.ledger_only != "all"
+    return bool(state.ledger_stage or state.ledger_words or state.ledger_reason) or state.ledger_only != "all"
 
 
 def listed(state: State) -> Sequence[Entry]:
     """The entries that are listed: those that pass the filter, else the branches of the entry that is open."""
     entries = ledger_of(state)
     if filtered(state):
-        return chosen(entries, state.ledger_stage, state.ledger_only, state.ledger_words)
+        return [entry for entry in counted(state) if state.ledger_reason in ("", entry.reason)]
     return children_of(entries).get(state.ledger_at, ())
+
+
+def counted(state: State) -> Sequence[Entry]:
+    """The entries whose reasons are counted: those that pass the filter, whatever their reason."""
+    return chosen(ledger_of(state), state.ledger_stage, state.ledger_only, state.ledger_words)
+
+
+def reasons(state: State) -> list[tuple[str, int]]:
+    """Each reason with how many entries fell for it, the most frequent first."""
+    return list(rejected_counts(counted(state)).items())
 
 
 def ledger_page(state: State) -> Sequence[Entry]:

@@ -9,6 +9,7 @@ from handey_studio.task.plan import MoveResult
 
 FIRST = "(The first job after an installation takes a minute or two longer: its code is compiled, once.)"
 UNSEEN = "By the arm's joints the part is where it was to be; no scan sees that place."
+CLEAR = "Clear what hides it, or turn it; Located tells what was nearly taken for it."
 STAGES = (("Sense", 0.0), ("Plan", SENSED), ("Execute", PLANNED))
 
 
@@ -37,7 +38,7 @@ def next_step(state: State) -> tuple[str, str, str]:
         return "Choose a part", "Pick the part that the arm shall move, below.", "info"
     result = session.result
     if result is None:
-        return "Ready to MOVE", "Check the destination, then press Plan to look before anything moves, or MOVE to do it.", "info"
+        return _before_the_move(state, state.command.part)
     if result.command != state.command:
         return "The command has changed", "What is shown belongs to the MOVE before. Press Plan or MOVE for the new one.", "info"
     if result.reason == CANCELLED:
@@ -53,6 +54,15 @@ def next_step(state: State) -> tuple[str, str, str]:
     return "Done", "The part was moved. Choose where it goes next, or save the session.", "good"
 
 
+def _before_the_move(state: State, part: str) -> tuple[str, str, str]:
+    """What to do before anything was planned: the cell may have been searched already, and not have shown the part."""
+    scene = state.session.scene
+    found = scene is None or any(part in (placed.name, placed.part.name) for placed in scene.instances)
+    if found:
+        return "Ready to MOVE", "Check the destination, then press Plan to look before anything moves, or MOVE to do it.", "info"
+    return f"{part} was not found", f"{CLEAR} Plan and MOVE scan again.", "bad"
+
+
 def unseen(result: MoveResult) -> bool:
     """Whether no scan afterwards could see where a part was put."""
     check = result.performance.check if result.performance is not None else None
@@ -64,7 +74,7 @@ def _way_out(reason: str) -> str:
     if reason.startswith(UNSURE):
         return "No destination helps: this view does not tell how it stands. Turn it over, or onto another side, and scan again."
     if "was not found in the scan" in reason:
-        return "Clear what hides it, or turn it; Located tells what was nearly taken for it."
+        return CLEAR
     return "The ledger tells what was tried; another destination may do."
 
 

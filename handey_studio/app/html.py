@@ -58,12 +58,24 @@ def swatch(colour: palette.RGB, label: str) -> str:
     )
 
 
-def count_row(label: str, count: int, most: int, colour: palette.RGB) -> str:
-    """A label, a bar as long as its count's share of the most, and the count."""
+def pressed(button: str, chosen: bool) -> str:
+    """Attributes of a row that presses a button (an element's id) when it is clicked."""
+    return f'role="button" tabindex="0" aria-pressed="{str(chosen).lower()}" onclick="{esc(pressing(button))}"'
+
+
+def row_look(chosen: bool) -> str:
+    """Style of a row in a list: its edge and ground tell whether it is looked at."""
+    blue = css(palette.BLUE)
+    return f"border-left:3px solid {blue};background:{blue}1c" if chosen else "border-left:3px solid var(--line)"
+
+
+def count_row(label: str, count: int, most: int, colour: palette.RGB, button: str = "", chosen: bool = False) -> str:
+    """A label, a bar as long as its count's share of the most, and the count; a click presses a button (an element's id)."""
     width = max(3.0, 100.0 * count / max(most, 1))
     bar = f'<div style="width:{width:.0f}%;background:{css(colour)};height:8px;border-radius:3px"></div>'
     return (
-        '<div style="display:flex;align-items:center;gap:8px;margin:2px 0">'
+        f'<div {pressed(button, chosen) if button else ""} style="display:flex;align-items:center;gap:8px;margin:2px 0;'
+        f'{f"cursor:pointer;padding:1px 0 1px 8px;{row_look(chosen)}" if button else ""}">'
         f'<div style="flex:0 0 62%;line-height:1.25">{esc(label)}</div>'
         f'<div style="flex:1;background:var(--track);border-radius:3px">{bar}</div>'
         f'<div style="flex:0 0 48px;text-align:right;font-variant-numeric:tabular-nums">{count}</div></div>'

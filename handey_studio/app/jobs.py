@@ -64,7 +64,7 @@ class JobDone:
         if state.job.done is not None:
             return state.job.done(replace(state, job=None), self.session)
         session, executed = merged(state.session, self.session), state.job.execute
-        state = replace(state, session=session, job=None, ledger_at=ROOT, ledger_page=0, ledger_entry=ROOT)
+        state = replace(state, session=session, job=None, ledger_at=ROOT, ledger_page=0, ledger_entry=ROOT, ledger_reason="")
         state = with_view(state, time_s=0.0, result=-1, attempt=0)
         result = session.result
         if result is None:

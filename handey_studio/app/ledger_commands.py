@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from handey_studio.app.browsing import LEDGER_ROWS, filtered, ledger_of, ledger_page, listed
+from handey_studio.app.browsing import LEDGER_ROWS, filtered, ledger_of, ledger_page, listed, reasons
 from handey_studio.app.state import State
 from handey_studio.session.ledger_tree import ROOT, children_of, path_to
 
@@ -21,6 +21,20 @@ class FilterLedger:
             ledger_words=state.ledger_words if self.words is None else self.words[:80],
             ledger_page=0,
         )
+
+
+@dataclass(frozen=True)
+class LedgerReason:
+    """List what fell for the reason in a row of the reasons; again: no longer."""
+
+    row: int
+
+    def apply(self, state: State) -> State:
+        known = [reason for reason, _ in reasons(state)]
+        if not 0 <= self.row < len(known):
+            return state
+        reason = "" if known[self.row] == state.ledger_reason else known[self.row]
+        return replace(state, ledger_reason=reason, ledger_page=0)
 
 
 @dataclass(frozen=True)
@@ -74,7 +88,7 @@ class LookAtEntry:
         above = path_to(ledger_of(state), entry.id)[:-1]
         at = above[-1].id if above else ROOT
         page = children_of(ledger_of(state))[at].index(entry) // LEDGER_ROWS
-        state = replace(state, ledger_stage="", ledger_only="all", ledger_words="")
+        state = replace(state, ledger_stage="", ledger_only="all", ledger_words="", ledger_reason="")
         return replace(state, ledger_at=at, ledger_page=page, ledger_entry=entry.id)
 
 

@@ -105,6 +105,7 @@ class State:
     ledger_stage: str = ""
     ledger_only: str = "all"
     ledger_words: str = ""
+    ledger_reason: str = ""
     ledger_at: int = ROOT
     ledger_page: int = 0
     ledger_entry: int = ROOT

@@ -106,11 +106,38 @@ const waiting = setInterval(() => {
 def show_tabs(client: viser.ClientHandle, *labels: str, remembered: bool = False) -> None:
     """Bring the tabs of those names to the front in one browser, or with `remembered`, those that were in front before its page was loaded
     anew; this version of viser has no call for it, so the page presses them itself."""
+    _run_in_page(client, SHOW_TABS.replace("LABELS", json.dumps(labels)).replace("REMEMBERED", json.dumps(remembered)))
+
+
+PAGE_KEYS = """
+const tamed = event => {
+  if (event.key === 'Enter' && event.target.matches('[role=button][onclick]')) {
+    event.target.click();
+    event.stopPropagation();
+  }
+  const dialog = [...document.querySelectorAll('[role=dialog]')].pop();
+  if (!dialog) return;
+  event.stopPropagation();
+  if (event.key !== 'Escape') return;
+  const close = [...dialog.querySelectorAll('button')].find(button => button.textContent.trim() === 'Close');
+  if (close) close.click();
+};
+document.body.removeEventListener('keydown', window.tamedKeys);
+document.body.addEventListener('keydown', window.tamedKeys = tamed);
+"""  # the page's shortcuts listen further out
+
+
+def tame_keys(client: viser.ClientHandle) -> None:
+    """Enter presses the row of a list that has the focus. While a dialog is open its keys are its own, none a shortcut: Enter presses the
+    button that has the focus, Escape closes it."""
+    _run_in_page(client, PAGE_KEYS)
+
+
+def _run_in_page(client: viser.ClientHandle, source: str) -> None:
     connection, message = getattr(client, "_websock_connection", None), getattr(_messages, "RunJavascriptMessage", None)
     if connection is None or message is None:
-        log.warning("this version of viser cannot bring a tab to the front")
+        log.warning("this version of viser runs no scripts: tabs stay where they are, and keys reach through dialogs")
         return
-    source = SHOW_TABS.replace("LABELS", json.dumps(labels)).replace("REMEMBERED", json.dumps(remembered))
     connection.queue_message(message(source=source))
 
 

@@ -27,7 +27,7 @@ from handey_studio.app.scene.units import SCALE, metres
 from handey_studio.app.state import State, opened
 from handey_studio.app.tabs import front_tabs, tabs_with_news
 from handey_studio.app.view import View
-from handey_studio.app.wire import show_tabs
+from handey_studio.app.wire import show_tabs, tame_keys
 from handey_studio.base import BadInput
 from handey_studio.session import Session
 from handey_studio.world import Library
@@ -185,6 +185,7 @@ class Workbench:
 
     def _arrived(self, client: viser.ClientHandle) -> None:
         self.send(Viewers(1))
+        tame_keys(client)
         show_tabs(client, *front_tabs(self.state), remembered=True)
 
         def moved(camera: viser.CameraHandle) -> None:

@@ -11,13 +11,13 @@ from handey_studio.app.browsing import chosen, ledger_page, listed
 from handey_studio.app.commands import Redo, Undo
 from handey_studio.app.guidance import next_step
 from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows, JobStarted
-from handey_studio.app.ledger_commands import FilterLedger, LedgerPage, LedgerRow, LedgerUp, LookAtNoEntry
+from handey_studio.app.ledger_commands import FilterLedger, LedgerPage, LedgerReason, LedgerRow, LedgerUp, LookAtNoEntry
 from handey_studio.app.looking_at import PointAt, Select, ShowLayer
 from handey_studio.app.playback import Seek, SeekStep, SetPlayback, Tick, TogglePlay
 from handey_studio.app.setting_up import ChoosePart, ChooseRobot, DropGhost, FreePose, ResetCell, SetDestination, SetSeed
 from handey_studio.app.settings import Settings
 from handey_studio.app.state import MAX_UNDO, opened
-from handey_studio.base import BadInput, Ledger
+from handey_studio.base import BadInput, Ledger, rejected_counts
 from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy
 from handey_studio.session.destination import destination_pose, snapped
 from handey_studio.session.ledger_tree import ROOT
@@ -195,6 +195,12 @@ def test_the_ledger_is_filtered_by_stage_outcome_and_words(full):
     assert {e.stage for e in chosen(entries, "grasp", "fell", "")} == {"grasp"}
     assert len(chosen(entries, "", "fell", "FACES tilted")) == 3
     assert [e.option for e in chosen(entries, "grasp", "stood", "")] == ["faces 0 and 5 at 0°"]
+    reasons = rejected_counts(entries)
+    for row, (reason, count) in enumerate(reasons.items()):
+        state = LedgerReason(row).apply(full)
+        assert [entry.reason for entry in listed(state)] == [reason] * count
+        assert listed(LedgerReason(row).apply(state)) == listed(full)
+    assert len(reasons) > 1 and LedgerReason(99).apply(full) is full
     assert len(FilterLedger(words="x" * 500).apply(full).ledger_words) == 80
 
 
@@ -205,6 +211,14 @@ def test_every_state_says_what_to_do_next(fresh, full):
     titles = [next_step(s)[0] for s in (fresh, full, bare, no_plan, JobStarted(True).apply(full), SetDestination("0,0,0").apply(full))]
     assert len(set(titles)) == len(titles)
     assert "No grasp." in next_step(no_plan)[1]
+
+
+def test_a_part_that_the_search_did_not_find_is_not_ready_to_move(full):
+    sensed = replace(full, session=replace(full.session, results=()))
+    assert next_step(sensed)[0] == "Ready to MOVE"
+    nothing = replace(sensed, session=replace(sensed.session, scene=replace(sensed.session.scene, instances=())))
+    title, words, tone = next_step(nothing)
+    assert title == f"{nothing.command.part} was not found" and "Located" in words and tone == "bad"
 
 
 def tree_of(full):

@@ -74,7 +74,7 @@ def test_words_of_others_are_escaped_everywhere(session):
     located = replace(scene.located, reason=evil)
     state = told(session, entries)
     shown = [
-        ledger_html(state, ["b"]),
+        ledger_html(state, ["b"], ["r"]),
         entry_html(entries[0], entries),
         result_html(result) + timing_html(result),
         found_html(replace(session, scene=replace(scene, located=located))),
@@ -107,9 +107,9 @@ def test_the_ledger_is_a_tree_of_rows_and_says_what_an_entry_belongs_to(session)
     assert context(book.entries[4], known) == "here › edge 2 › hand at 5°"
     assert context(book.entries[first], known) == "here" and context(book.entries[goal], known) == ""
     state = told(session, book.entries)
-    text = ledger_html(state, ["b"] * 9)
+    text = ledger_html(state, ["b"] * 9, ["r"] * 6)
     assert "here" in text and "4 ▸" in text and "2 of 4 below it fell" in text and 'data-testid="entry-1"' not in text
-    text = ledger_html(replace(state, ledger_at=hand, ledger_entry=4), ["b"] * 9)
+    text = ledger_html(replace(state, ledger_at=hand, ledger_entry=4), ["b"] * 9, ["r"] * 6)
     assert "here › edge 2 › hand at 5°" in text and "the arm collides (a and b): -13 mm, limit 1 mm" in text
     assert "-13 mm" in entry_html(book.entries[4], book.entries)
 

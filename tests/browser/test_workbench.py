@@ -34,7 +34,8 @@ def test_the_page_shows_the_cell_and_says_what_to_do(studio, visit, tmp_path):
 
 
 def test_an_empty_workbench_tells_how_to_fill_it(studio, visit, tmp_path):
-    page = visit(studio(fresh_session(tmp_path)))
+    workbench = studio(fresh_session(tmp_path))
+    page = visit(workbench)
     assert "Ready to MOVE" in pane(page, "next-step").inner_text()
     assert "Press Plan or MOVE" in pane(page, "timeline-empty").inner_text()
     for tab in ("Located", "Grasp", "Path", "Ledger", "Result"):
@@ -42,9 +43,17 @@ def test_an_empty_workbench_tells_how_to_fill_it(studio, visit, tmp_path):
         pane(page, f"{EMPTY.get(tab, tab.lower())}-empty").wait_for()
     press(page, "Guide")
     page.get_by_role("dialog").get_by_text("The configuration space").first.wait_for()
-    page.get_by_role("button", name="Close", exact=True).evaluate("button => button.click()")  # a notice may lie over it
+    page.keyboard.press("Escape")
+    page.get_by_role("dialog").wait_for(state="detached")
     press(page, "Keys")
     pane(page, "keys").get_by_text("play or pause").wait_for()
+    page.keyboard.press("m")  # no shortcut while a dialog is open
+    page.keyboard.press("Enter")
+    page.get_by_role("dialog").wait_for(state="detached")
+    assert workbench.state.jobs == 0
+    page.get_by_role("tab", name="View").click()
+    page.get_by_label("Dark page").click()
+    page.locator(":root[data-mantine-color-scheme=dark]").wait_for(state="attached")
 
 
 def test_what_the_user_set_is_undone_and_redone(studio, visit, tmp_path):

@@ -8,7 +8,6 @@ import viser
 from handey_studio.app import html, palette
 from handey_studio.app.actions import CancelMove
 from handey_studio.app.page_style import in_a_row
-from handey_studio.app.palette import css
 from handey_studio.app.sequence import AddCommand, ChooseCommand, RemoveCommand, RunCommands, ShiftCommand, SkipCommand, StartOver
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, set_to
@@ -84,7 +83,7 @@ def commands_html(state: State, first: int, buttons: Sequence[str]) -> str:
 def _row(state: State, number: int, told: CommandState, button: str) -> str:
     command, chosen = state.session.commands[number], number == state.command_number
     sign, colour = SIGNS[told.status]
-    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:var(--line)"
+    look = html.row_look(chosen)
     clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     why = state.session.results[told.result].reason if told.result >= 0 else ""
     below = (
@@ -95,7 +94,7 @@ def _row(state: State, number: int, told: CommandState, button: str) -> str:
     words = html.esc(f"{command.part} → {command.to}")
     return (
         f'<div data-testid="command-{number}" data-status="{told.status}" role="button" tabindex="0" title="{words}: {told.status}" '
-        f'onclick="{html.esc(html.pressing(button))}" style="cursor:pointer;border-left:3px solid;{look};padding:2px 8px">'
+        f'onclick="{html.esc(html.pressing(button))}" style="cursor:pointer;{look};padding:2px 8px">'
         f'<div style="display:flex;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
         f'<span style="color:var(--faint);width:16px">{number + 1}</span><span style="flex:1;{clipped}">{words}</span></div>{below}</div>'
     )

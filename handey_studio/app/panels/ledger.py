@@ -6,12 +6,11 @@ from typing import Any
 import viser
 
 from handey_studio.app import html, palette
-from handey_studio.app.browsing import LEDGER_ROWS, filtered, ledger_of, ledger_page, listed
-from handey_studio.app.ledger_commands import FilterLedger, LedgerPage, LedgerRow, LedgerUp, LookAtNoEntry
-from handey_studio.app.palette import css
+from handey_studio.app.browsing import LEDGER_ROWS, filtered, ledger_of, ledger_page, listed, reasons
+from handey_studio.app.ledger_commands import FilterLedger, LedgerPage, LedgerReason, LedgerRow, LedgerUp, LookAtNoEntry
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
-from handey_studio.base import Entry, describe, rejected_counts
+from handey_studio.base import Entry, describe
 from handey_studio.session.ledger_tree import path_to, sizes_below
 
 ALL_STAGES = "all stages"
@@ -32,6 +31,7 @@ class LedgerPanel:
         self._words = gui.add_text("Find", "")
         self._list = gui.add_html("")
         self._rows = [gui.add_button(f"Entry in row {row + 1}") for row in range(LEDGER_ROWS)]  # pressed by the list, which hides them
+        self._reasons = [gui.add_button(f"Reason in row {row + 1}") for row in range(MAX_REASONS)]
         self._browse = gui.add_button_group("Branches", (UP, BACK, ON, AWAY), hint="A row with ▸ opens what was tried below it")
         self._about = gui.add_html("")
         on_user(self._stage, send, lambda event: FilterLedger(stage="" if event.target.value == ALL_STAGES else event.target.value))
@@ -40,6 +40,8 @@ class LedgerPanel:
         on_click(self._browse, send, lambda event: PRESSED[event.target.value])
         for row, button in enumerate(self._rows):
             on_click(button, send, lambda _, row=row: LedgerRow(row))
+        for row, button in enumerate(self._reasons):
+            on_click(button, send, lambda _, row=row: LedgerReason(row))
 
     def render(self, old: State | None, new: State) -> None:
         if old is not None and _looks(old) == _looks(new):
@@ -49,27 +51,39 @@ class LedgerPanel:
         if tuple(self._stage.options) != stages:
             self._stage.options = stages
         set_to(self._stage, value=new.ledger_stage if new.ledger_stage in stages else ALL_STAGES)
-        buttons = [element_id(button) for button in self._rows]
+        buttons, reasons = [element_id(button) for button in self._rows], [element_id(button) for button in self._reasons]
         set_to(self._browse, visible=bool(entries))
-        self._list.content = ledger_html(new, buttons) if entries else html.hidden(buttons) + html.empty(NOTHING, "ledger-empty")
+        self._list.content = (
+            ledger_html(new, buttons, reasons) if entries else html.hidden((*buttons, *reasons)) + html.empty(NOTHING, "ledger-empty")
+        )
         self._about.content = entry_html(new.entry, entries) if new.entry is not None else ""
 
 
-def ledger_html(state: State, buttons: Sequence[str]) -> str:
-    """Reasons by count, the way down to the branches that are listed, then a row each; a click presses the button of its place."""
+def ledger_html(state: State, buttons: Sequence[str], pressed: Sequence[str]) -> str:
+    """Reasons by count, the way down to the branches that are listed, then a row each; a click presses the button of its place, `pressed`
+    those of the reasons."""
     entries, page, every = ledger_of(state), ledger_page(state), listed(state)
-    counts = list(rejected_counts(every if filtered(state) else entries).items())
-    most = max((count for _, count in counts), default=1)
-    bars = "".join(html.count_row(reason, count, most, palette.VERMILLION) for reason, count in counts[:MAX_REASONS])
     below = sizes_below(entries)
     rows = "".join(_row(entry, below[entry.id], entry.id == state.ledger_entry, b) for entry, b in zip(page, buttons, strict=False))
     first = state.ledger_page * LEDGER_ROWS
     head = f"{first + 1} to {first + len(page)} of {len(every)}" if page else "none"
     where = f"{len(every)} of {len(entries)} entries match; {head}" if filtered(state) else f"{_trail(state)}: {head}"
     return (
-        f'{html.hidden(buttons)}<div data-testid="ledger" style="margin:4px 14px;font-size:12px;line-height:1.4">{bars}'
+        f'{html.hidden((*buttons, *pressed))}<div data-testid="ledger" style="margin:4px 14px;font-size:12px;line-height:1.4">'
+        f"{_reason_rows(state, pressed)}"
         f'<div style="color:var(--muted);margin:8px 0 3px">{where}</div>{rows}</div>'
     )
+
+
+def _reason_rows(state: State, buttons: Sequence[str]) -> str:
+    """A bar for each of the most frequent reasons; the one whose entries are listed is marked."""
+    counts = reasons(state)
+    most, left = max((count for _, count in counts), default=1), len(counts) - MAX_REASONS
+    rows = "".join(
+        html.count_row(reason, count, most, palette.VERMILLION, button, reason == state.ledger_reason)
+        for (reason, count), button in zip(counts, buttons, strict=False)
+    )
+    return rows + (f'<div style="color:var(--muted)">and {left} more reasons: Find, above, looks for words</div>' if left > 0 else "")
 
 
 def _trail(state: State) -> str:
@@ -82,13 +96,13 @@ def _row(entry: Entry, below: tuple[int, int], looked_at: bool, button: str) -> 
     """A mark that says whether it fell, the option, how much was tried below it, and the reason with value and limit."""
     fell = entry.reason is not None
     colour, sign = (palette.VERMILLION, "✕") if fell else (palette.TEAL, "●")
-    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if looked_at else "border-left-color:var(--line)"
+    look = html.row_look(looked_at)
     more = f'<span style="color:var(--muted);white-space:nowrap">{below[0]} ▸</span>' if below[0] else ""
     stood = f"{below[1]} of {below[0]} below it fell" if below[0] else STOOD.get(entry.stage, "nothing speaks against it")
     said = html.esc(describe(entry) or stood)
     return (
         f'<div data-testid="entry-{entry.id}" role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}" '
-        f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
+        f'style="cursor:pointer;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
         f'<div style="display:flex;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
         f'<span style="flex:1;overflow-wrap:anywhere"><span style="color:var(--faint)">{html.esc(entry.stage)}</span> '
         f"{html.esc(entry.option)}</span>"
@@ -119,5 +133,5 @@ def context(entry: Entry, known: dict[int, Entry]) -> str:
 
 
 def _looks(state: State) -> tuple:
-    filters = state.ledger_stage, state.ledger_only, state.ledger_words
+    filters = state.ledger_stage, state.ledger_only, state.ledger_words, state.ledger_reason
     return state.session.result, filters, state.ledger_at, state.ledger_page, state.ledger_entry

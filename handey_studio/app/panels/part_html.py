@@ -177,7 +177,7 @@ def history_html(steps: Sequence[Step], looked_at: int | None, field: str) -> st
 
 def _step(step: Step, chosen: bool, field: str) -> str:
     colour, sign = (palette.VERMILLION, "✕") if step.reason else (palette.TEAL, "✓")
-    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:var(--line)"
+    look = html.row_look(chosen)
     words = f'<span style="flex:1;{CLIPPED}" title="{html.esc(step.told)}">{html.esc(step.told)}</span>'
     why = (
         f'<div style="color:{palette.text(colour)};padding-left:34px;font-size:11.5px">{html.esc(step.reason)}</div>' if step.reason else ""
@@ -185,7 +185,7 @@ def _step(step: Step, chosen: bool, field: str) -> str:
     return (
         f'<div data-testid="step-{step.number}" role="button" tabindex="0" aria-pressed="{str(chosen).lower()}" '
         f'onclick="{html.esc(html.picking(field, str(step.number)))}" '
-        f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
+        f'style="cursor:pointer;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
         f'<div style="display:flex;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
         f'<span style="color:var(--faint);width:16px">{step.number + 1}</span>{words}</div>{why}</div>'
     )

@@ -32,13 +32,13 @@ def hypothesis_rows(scene: Scene, page: Sequence[int], listed: Sequence[int], ch
 def _row(scene: Scene, number: int, chosen: bool, button: str) -> str:
     hypothesis = scene.located.hypotheses[number]
     colour, sign = (palette.VERMILLION, "✕") if hypothesis.reason else (palette.TEAL, "●")
-    look = f"background:{css(palette.BLUE)}1c;border-left-color:{css(palette.BLUE)}" if chosen else "border-left-color:var(--line)"
+    look = html.row_look(chosen)
     click = f' role="button" tabindex="0" onclick="{html.esc(html.pressing(button))}"' if button else ""
     clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     said = html.esc(reason_of(scene, hypothesis))
     return (
         f'<div data-testid="hypothesis-{number}"{click} aria-pressed="{str(chosen).lower()}" '
-        f'style="cursor:pointer;border-left:3px solid;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
+        f'style="cursor:pointer;{look};padding:3px 8px;margin-bottom:2px;border-radius:3px">'
         f'<div style="display:flex;align-items:center;gap:6px"><span style="color:{palette.text(colour)};width:12px">{sign}</span>'
         f'<span style="color:var(--faint);width:16px">{number + 1}</span>'
         f'<b style="font-weight:600;flex:1;{clipped}">{html.esc(hypothesis.part)}</b>{_bar(hypothesis, colour)}'
