@@ -11,7 +11,7 @@ from handey_studio.grasping.classes import (
     hand_in_plane,
 )
 from handey_studio.grasping.free_patches import Patch, PatchOptions, Wanted, free_patches
-from handey_studio.grasping.grasp_motion import MotionOptions, plan_grasp_motion, plan_lowering, plan_retreat
+from handey_studio.grasping.grasp_motion import MotionOptions, plan_grasp_motion, plan_removal, plan_retreat
 from handey_studio.grasping.grasp_placement_table import GraspPlacementTable, TableOptions, grasp_placement_table, legal_at, tilts_at
 from handey_studio.grasping.grasp_plane import GraspPlane, fill_grasp_plane
 from handey_studio.grasping.groups import GraspGroup, grasp_groups
@@ -87,7 +87,7 @@ __all__ = [
     "pad_wrenches",
     "plan_approach",
     "plan_grasp_motion",
-    "plan_lowering",
+    "plan_removal",
     "plan_retreat",
     "plane_outlines",
     "plane_space",

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from handey_studio.base import Value, frozen_array
 from handey_studio.grasping.bump_run import BumpIterations, BumpRun, FoundBy, Status
 from handey_studio.grasping.grasp_plane import Filled, GraspPlane
-from handey_studio.grasping.hand_outline import VOLUMES, Outline, hand_outline, hand_rectangles, meets, rectangle_meets
-from handey_studio.world import Hand
+from handey_studio.grasping.hand_outline import VOLUMES, Outline, meets, rectangle_meets
 
 LEVER_M = 0.06  # torques are measured against a lever about as long as a finger
 TOWARDS = 0.05  # a bump vector counts as open towards the goal if it has at least this much of the free motion vector
@@ -84,28 +83,40 @@ class _Lines(NamedTuple):
     volumes: NDArray
 
 
-def bump_lines(hand: Hand, options: BumpOptions) -> BumpLines:
-    """Front, sides and back of each of the hand's rectangles, at both distances: four near ones, then the far ones beside them."""
+def bump_lines(outline: Outline, options: BumpOptions) -> BumpLines:
+    """Front, sides and back of each of the hand's rectangles, and of one around what it holds, at both distances: four near ones, then the
+    far ones beside them."""
     ends, vectors, volumes, far = [], [], [], []
-    for volume, w, low, high in hand_rectangles(hand):
+    for volume, (left, right, low, high) in _rectangles(outline):
         for d in (options.near, options.far):
             lines = (
-                ([[-w - d, high + d], [w + d, high + d]], [0.0, 1.0]),
-                ([[w + d, low], [w + d, high + d]], [1.0, 0.0]),
-                ([[-w - d, low], [-w - d, high + d]], [-1.0, 0.0]),
-                ([[-w - d, low - d], [w + d, low - d]], [0.0, -1.0]),
+                ([[left - d, high + d], [right + d, high + d]], [0.0, 1.0]),
+                ([[right + d, low], [right + d, high + d]], [1.0, 0.0]),
+                ([[left - d, low], [left - d, high + d]], [-1.0, 0.0]),
+                ([[left - d, low - d], [right + d, low - d]], [0.0, -1.0]),
             )
             for line, vector in lines:
                 ends.append(line)
                 vectors.append(vector)
-                volumes.append(volume)
+                volumes.append(VOLUMES[volume])
                 far.append(d == options.far)
     return BumpLines(np.array(ends), np.array(vectors), tuple(volumes), np.array(far))
 
 
-def plan_approach(plane: GraspPlane, hand: Hand, start: NDArray, goal: NDArray, options: BumpOptions = BumpOptions()) -> BumpRun:
-    """Bring the fingertips from `start` (y, z, angle) to the point `goal` (y, z) [m] without entering a filled cell."""
-    lines, outline = bump_lines(hand, options), hand_outline(hand)
+def _rectangles(outline: Outline) -> list[tuple[int, NDArray]]:
+    """(volume, bounds) of the hand's rectangles, and of the one around all that is held."""
+    held = outline.volumes == VOLUMES.index("held")
+    found = [(int(volume), bounds) for volume, bounds in zip(outline.volumes[~held], outline.bounds[~held], strict=True)]
+    if held.any():
+        low, high = outline.bounds[held].min(axis=0), outline.bounds[held].max(axis=0)
+        found.append((VOLUMES.index("held"), np.array([low[0], high[1], low[2], high[3]])))
+    return found
+
+
+def plan_approach(plane: GraspPlane, outline: Outline, start: NDArray, goal: NDArray, options: BumpOptions = BumpOptions()) -> BumpRun:
+    """Bring the fingertips of the hand, alone or with what it holds, from `start` (y, z, angle) to the point `goal` (y, z) [m] without
+    entering a filled cell."""
+    lines = bump_lines(outline, options)
     centres = lines.ends.mean(axis=1)
     # (across, along) is a left-handed pair of axes, as a positive turn carries `along` towards `across`; hence minus vector × arm
     # is the turn that moves the line's centre away from what it bumps into.

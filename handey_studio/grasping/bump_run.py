@@ -1,6 +1,6 @@
 """What a run of the grasp approach planner tells (Handey 1987 §5.2, Figures 9 and 10)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from numpy.typing import NDArray
@@ -51,3 +51,7 @@ class BumpRun(Value):
     def __post_init__(self) -> None:
         object.__setattr__(self, "path", frozen_array(self.path))
         object.__setattr__(self, "goal", frozen_array(self.goal))
+
+    def reversed(self) -> "BumpRun":
+        """The same the other way round; the iterations stay as they were."""
+        return replace(self, path=self.path[::-1], goal=self.path[0, :2])

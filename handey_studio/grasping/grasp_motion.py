@@ -12,9 +12,10 @@ from handey_studio.grasping.bump_run import BumpRun, FoundBy
 from handey_studio.grasping.classes import contact_area, contact_areas
 from handey_studio.grasping.grasp_plane import GraspPlane
 from handey_studio.grasping.groups import GraspGroup
-from handey_studio.grasping.hand_outline import Outline, hand_outline
+from handey_studio.grasping.hand_outline import Outline, hand_outline, overlaps
 from handey_studio.grasping.plane_paths import is_free, shortened
-from handey_studio.grasping.plane_search import PlaneSpace, SearchOptions, plane_space, way_out
+from handey_studio.grasping.plane_search import PlaneSpace, SearchOptions, beyond, plane_space, way_out
+from handey_studio.grasping.roofs import under_roofs
 from handey_studio.world import Hand
 
 
@@ -22,15 +23,21 @@ from handey_studio.world import Hand
 class MotionOptions:
     """The bump-line planner starts straight back from the grasp by each of `standoffs` [m]; then by the first one in directions off by
     `asides` [rad], with the hand as it is to be in the end and with the hand turned as well. Leaving, the same the other way round. Where
-    the search may end anywhere, a radian that the fingers are off straight down costs as much as a way of `tilt_cost` [m]. What is put
-    down comes the last bit, `last_bit` [m] at most, on a straight line, as it may touch what it stands on."""
+    the search may end anywhere, a radian that the fingers are off straight down costs as much as a way of `tilt_cost` [m]."""
 
     standoffs: tuple[float, ...] = (0.08, 0.05)
     asides: tuple[float, ...] = (0.35, -0.35, 0.7, -0.7)
     tilt_cost: float = 0.05
-    last_bit: float = 0.06
     bumps: BumpOptions = field(default_factory=BumpOptions)
     search: SearchOptions = field(default_factory=SearchOptions)
+
+
+WITH_PART = MotionOptions(
+    standoffs=(0.08, 0.16, 0.05),
+    asides=(1.57, -1.57, 0.7, -0.7),
+    search=SearchOptions(step=0.004, turn=float(np.deg2rad(7.5)), radius=0.20, out=0.04),
+)
+"""With a part in the hand the way is longer, and also leads aside; a radian that the part is turned costs what tilted fingers do."""
 
 
 def plan_grasp_motion(
@@ -49,17 +56,17 @@ def plan_grasp_motion(
     """
     outline, nearest = hand_outline(hand), None
     for start, found_by in _starts(np.array([*group.point, angle]), group.depth, options):
-        run = _judged(plan_approach(plane, hand, start, group.point, options.bumps), hand, group, ranges)
+        run = _judged(plan_approach(plane, outline, start, group.point, options.bumps), hand, group, ranges)
         if run.status == "reached":
             path = shortened(plane, outline, run.path, options.search.margin)
             return replace(run, path=path, found_by=found_by)
         nearest = run if nearest is None or run.distance < nearest.distance else nearest
     assert nearest is not None
     space = plane_space(plane, outline, np.array([*group.point, angle]), options.search)
-    path, allowed = None, _allowed(space, hand, group, ranges)
+    path, allowed, cost = None, _allowed(space, hand, group, ranges), _upright(plane, space, options)
     for angles in ([a for a in allowed if a == space.root[2]], allowed):
         sources = [found for a in angles for found in _source(plane, outline, space, a, -_along(a), options.search.out)]
-        path = _ways(plane, outline, space, sources, options) if path is None else path
+        path = _ways(plane, outline, space, sources, cost, options) if path is None else path
     if path is None:
         return replace(nearest, status="no way") if nearest.status != "short contact" else nearest
     return replace(nearest, path=path[::-1], status="reached", distance=0.0, found_by="plane search")
@@ -76,38 +83,46 @@ def plan_retreat(plane: GraspPlane, hand: Hand, pose: NDArray, options: MotionOp
     if is_free(plane, outline, pose, out):
         path = shortened(plane, outline, np.array([pose, out]), 0.0)
         return BumpRun(plane, path, out[:2], "reached", 0.0, options.bumps.threshold, "straight back")
-    nearest = plan_approach(plane, hand, pose, out[:2], options.bumps)
+    nearest = plan_approach(plane, outline, pose, out[:2], options.bumps)
     for target, _ in others:
         if nearest.status != "stuck":
             break
-        run = plan_approach(plane, hand, pose, target[:2], options.bumps)
+        run = plan_approach(plane, outline, pose, target[:2], options.bumps)
         nearest = run if run.status == "reached" else nearest
     if nearest.status == "reached":
         return replace(nearest, path=shortened(plane, outline, nearest.path, options.search.margin))
     space = plane_space(plane, outline, pose, options.search)
     source = _source(plane, outline, space, pose[2], -_along(pose[2]), options.search.out)
-    path = _ways(plane, outline, space, source, options)
+    path = _ways(plane, outline, space, source, _upright(plane, space, options), options)
     if path is None:
         return replace(nearest, status="no way")
     return replace(nearest, path=path, goal=path[-1, :2], status="reached", distance=0.0, found_by="plane search")
 
 
-def plan_lowering(plane: GraspPlane, outline: Outline, pose: NDArray, options: MotionOptions = MotionOptions()) -> BumpRun:
-    """The way of the hand with a part in it down to where the part is put down, at the pose (y, z, angle) of the hand.
+def plan_removal(plane: GraspPlane, outline: Outline, pose: NDArray, options: MotionOptions = WITH_PART) -> BumpRun:
+    """The way of the hand with a part in it from a pose (y, z, angle) to where nothing is above them any more; backwards it is the way in.
 
-    `plane` and `outline` are those of hand and part together (`fill_grasp_plane` with `held`, `outline_with`). The last bit is straight, up
-    to where part and hand are clear of filled cells: upwards or back along the fingers, or between; it is not looked at here, as the part
-    may touch there. Beyond it the search leads. The path ends at the pose.
+    `plane` and `outline` are those of hand and part together (`fill_grasp_plane` with `held`, `outline_with`). At the pose they touch
+    nothing: the part has been lifted off what it stood on. Bump lines lead to one place after the other that lies back or aside,
+    until one is out; else the search does, to the nearest place that is. The path begins at the pose; `goal` is where it was to lead.
     """
-    pose = np.array(pose, dtype=float)
+    pose, roofs = np.array(pose, dtype=float), under_roofs(plane)
+    nearest: BumpRun | None = None
+    for target, found_by in _starts(pose, 0.0, options):
+        run = plan_approach(plane, outline, pose, target[:2], options.bumps)
+        if run.status == "reached" and not overlaps(roofs, outline, run.path[-1]):
+            return replace(run, path=shortened(plane, outline, run.path, 0.0), found_by=found_by)
+        nearest = run if nearest is None or run.distance < nearest.distance else nearest
+    assert nearest is not None
     space = plane_space(plane, outline, pose, options.search)
-    up, back = plane.T_world_plane[2, 1:3], -_along(pose[2])
-    directions = [direction / max(float(np.linalg.norm(direction)), 1e-9) for direction in (up, up + back, back)]
-    sources = [found for d in directions for found in _source(plane, outline, space, pose[2], d, options.last_bit, looked_at=False)]
-    path = _ways(plane, outline, space, sources, options)
+    roofed = plane_space(roofs, outline, pose, options.search, inside=True)
+    turned = options.tilt_cost * np.abs(space.angles - pose[2])[:, None, None]
+    cost = np.where(roofed.blocked | ~beyond(space, options.search.out), np.inf, turned)
+    sources = _source(plane, outline, space, pose[2], plane.T_world_plane[2, 1:3], options.search.out, looked_at=False)
+    path = _ways(plane, outline, space, sources, cost, options)
     if path is None:
-        return BumpRun(plane, pose[None], pose[:2], "no way", options.search.out, options.bumps.threshold)
-    return BumpRun(plane, path[::-1], pose[:2], "reached", 0.0, options.bumps.threshold, "plane search")
+        return replace(nearest, status="no way", found_by="")
+    return replace(nearest, path=path, goal=path[-1, :2], status="reached", distance=0.0, found_by="plane search")
 
 
 def _starts(pose: NDArray, depth: float, options: MotionOptions) -> Iterator[tuple[NDArray, FoundBy]]:
@@ -171,13 +186,20 @@ def _source(
     return []
 
 
-def _ways(plane: GraspPlane, outline: Outline, space: PlaneSpace, sources: list[_Source], options: MotionOptions) -> NDArray | None:
-    """The shortened path (k, 3) from one of the sources out of everything; None if there is none."""
-    if not sources:
-        return None
+def _upright(plane: GraspPlane, space: PlaneSpace, options: MotionOptions) -> NDArray:
+    """What it costs (angles, n, n) [m] the hand alone to be at a node: its tilt; infinite where it is not out yet."""
     fingers = np.stack([np.cos(space.angles), np.sin(space.angles)], axis=1) @ plane.T_world_plane[2, 1:3]
     tilts = np.arccos(np.clip(-fingers, -1.0, 1.0))
-    nodes = way_out(space, np.array([source.node for source in sources]), options.tilt_cost * tilts, options.search.out)
+    return np.where(beyond(space, options.search.out), options.tilt_cost * tilts[:, None, None], np.inf)
+
+
+def _ways(
+    plane: GraspPlane, outline: Outline, space: PlaneSpace, sources: list[_Source], cost: NDArray, options: MotionOptions
+) -> NDArray | None:
+    """The shortened path (k, 3) from one of the sources out of everything, to the node that costs least; None if there is none."""
+    if not sources:
+        return None
+    nodes = way_out(space, np.array([source.node for source in sources]), cost)
     if not len(nodes):
         return None
     first = next(source for source in sources if (source.node == nodes[0]).all())

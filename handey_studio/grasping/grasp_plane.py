@@ -24,6 +24,7 @@ from handey_studio.world.collision_bodies import TABLE_SKIN_M, solids_of
 
 CELL_M = 0.002
 WAY_IN_M = 0.12  # the bounding rectangle reaches this much farther from the grasp point than the hand is long
+WAY_WITH_PART_M = 0.24  # and this much for a hand with a part in it
 RAY_SPACING_M = 0.001  # finer maps are made coarser, the highest wins; coarser ones have several rays a column
 SAME_AREA = 1e-14  # [m²] points that span less lie on a line, or are one
 NO_CELLS = np.zeros((0, 0), dtype=bool)
@@ -78,7 +79,8 @@ def fill_grasp_plane(
 ) -> GraspPlane:
     """The grasp plane around `centre` (y, z) [m] with everything the world believes projected into it; `held` is where a part in the hand
     begins and ends along x [m]."""
-    origin, half = np.asarray(centre) - half_size(hand), opening / 2.0
+    reach, half = half_size(hand, WAY_WITH_PART_M if held else WAY_IN_M), opening / 2.0
+    origin = np.asarray(centre) - reach
     volumes = [
         [(-half - hand.finger_thickness, -half), (half, half + hand.finger_thickness)],
         [(-hand.crosspiece_length / 2.0, hand.crosspiece_length / 2.0)],
@@ -88,7 +90,7 @@ def fill_grasp_plane(
     bodies = [apply(T_plane_world, corners) for _, corners in solids_of(world)]
     first, corners = np.cumsum([0] + [len(body) for body in bodies]), np.concatenate(bodies)
     points = depth_points(world.terrain, world.table_z, float(world.free_space[1, 2])) if world.terrain is not None else np.empty((0, 3))
-    grids = [np.zeros((round(2 * half_size(hand) / CELL_M),) * 2, dtype=np.bool_) for _ in volumes]
+    grids = [np.zeros((round(2 * reach / CELL_M),) * 2, dtype=np.bool_) for _ in volumes]
     for grid, slabs in zip(grids, volumes, strict=True):
         for low, high in slabs:
             _fill_bodies(grid, corners, first, origin, CELL_M, low, high)
@@ -96,10 +98,10 @@ def fill_grasp_plane(
     return GraspPlane(T_world_plane, origin, CELL_M, *grids)
 
 
-def half_size(hand: Hand) -> float:
+def half_size(hand: Hand, way: float = WAY_IN_M) -> float:
     """How far [m] the bounding rectangle reaches from the grasp point to each side, in whole cells."""
     length = max(float(hand.T_flange_hand[2, 3]), hand.finger_length + hand.crosspiece_height)
-    return float(np.ceil((length + WAY_IN_M) / CELL_M - 1e-9)) * CELL_M
+    return float(np.ceil((length + way) / CELL_M - 1e-9)) * CELL_M
 
 
 @lru_cache(maxsize=8)

@@ -20,7 +20,7 @@ BIN_M = 0.001  # filled cells are counted in bins of this size, turned with the 
 @dataclass(frozen=True)
 class SearchOptions:
     """Lattice of fingertip positions `step` [m] and hand angles `turn` [rad] apart, within `radius` [m] and `reach` [rad] of the root; the
-    hand keeps `margin` [m] from filled cells. A way has led out when the fingertips are `out` [m] from the root."""
+    hand keeps `margin` [m] from filled cells. The hand alone is out when its fingertips are `out` [m] from the root."""
 
     step: float = 0.0025
     turn: float = float(np.deg2rad(5.0))
@@ -54,11 +54,14 @@ class PlaneSpace(NamedTuple):
         return self.root[2] + (np.arange(len(self.blocked)) - len(self.blocked) // 2) * self.turn
 
 
-def plane_space(plane: GraspPlane, outline: Outline, root: NDArray, options: SearchOptions = SearchOptions()) -> PlaneSpace:
+def plane_space(
+    plane: GraspPlane, outline: Outline, root: NDArray, options: SearchOptions = SearchOptions(), inside: bool = False
+) -> PlaneSpace:
     """Which lattice poses around `root` (y, z, angle) are blocked: where a filled cell comes within the margin of the outline.
 
     On the safe side by at most a bin and a half cell. Two free neighbours on the lattice are joined by free motion: a convex outline that
-    moves by a step to both sides at once passes what neither end comes within half a step of.
+    moves by a step to both sides at once passes what neither end comes within half a step of. A pose wholly inside filled cells, where
+    no motion leads, is told only if asked for.
     """
     margin = max(options.margin, 0.5 * options.step)
     count, angles = int(options.radius / options.step), int(options.reach / options.turn + 1e-9)
@@ -67,23 +70,27 @@ def plane_space(plane: GraspPlane, outline: Outline, root: NDArray, options: Sea
     for volume, filled in enumerate(plane.filled.volumes):
         mine = outline.bounds[outline.volumes == volume]
         if len(mine):
-            centres = plane.origin + (np.argwhere(_rim(filled)) + 0.5) * plane.cell - root[:2]
+            centres = plane.origin + (np.argwhere(filled if inside else _rim(filled)) + 0.5) * plane.cell - root[:2]
             _block(blocked, volume == 0, centres, plane.cell, mine, root[2], options.step, options.turn, margin)
     _block_beyond(blocked, plane.origin - root[:2], len(plane.fingers) * plane.cell, outline.bounds, root[2], options.step, options.turn)
     return PlaneSpace(root, blocked, options.step, options.turn)
 
 
-def way_out(space: PlaneSpace, sources: NDArray, prefer: NDArray, out: float) -> NDArray:
-    """The nodes (k, 3) of the way from one of `sources` (s, 3) to the best node at least `out` [m] from the root; empty if there is none.
+def way_out(space: PlaneSpace, sources: NDArray, cost: NDArray) -> NDArray:
+    """The nodes (k, 3) of the way from one of `sources` (s, 3) to the best node that is out; empty if there is none.
 
-    `prefer` (angles,) [m] is added to the length of the way there: smaller is better.
+    `cost` (angles, n, n) [m] is added to the length of the way to each node: smaller is better, and infinite where it is not out yet.
     """
     steps = _flood(space.blocked, sources)
+    total = np.where(steps >= 0, steps * space.step + cost, np.inf)
+    best = np.unravel_index(int(np.argmin(total)), total.shape)
+    return _trace(steps, np.array(best))[::-1] if np.isfinite(total[best]) else np.empty((0, 3), dtype=int)
+
+
+def beyond(space: PlaneSpace, out: float) -> NDArray:
+    """Which nodes (n, n) of each angle are at least `out` [m] from the root."""
     y, z = (np.arange(n) - n // 2 for n in space.blocked.shape[1:])
-    outside = np.hypot(y[:, None], z[None, :]) * space.step >= out
-    cost = np.where((steps >= 0) & outside, steps * space.step + prefer[:, None, None], np.inf)
-    best = np.unravel_index(int(np.argmin(cost)), cost.shape)
-    return _trace(steps, np.array(best))[::-1] if np.isfinite(cost[best]) else np.empty((0, 3), dtype=int)
+    return np.hypot(y[:, None], z[None, :]) * space.step >= out
 
 
 def _rim(filled: NDArray) -> NDArray:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+NEW = {"first_step": 0, "lifting": None, "lowering": None}  # of a carry, which format 1 had not
 CARRY = ("T_world_part_start", "T_world_part_goal", "grasp", "approach", "space")
 
 
@@ -18,4 +19,4 @@ def _result(result: Any) -> Any:
         return result
     carry = {key: plan[key] for key in CARRY if key in plan}
     kept = {key: value for key, value in plan.items() if key not in (*CARRY, "regrasps")}
-    return result | {"plan": kept | {"carries": [carry | {"first_step": 0}]}}
+    return result | {"plan": kept | {"carries": [carry | NEW]}}

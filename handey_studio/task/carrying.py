@@ -9,10 +9,11 @@ from handey_studio.base import Ledger, Posture, Progress, Value, frozen_array
 from handey_studio.geometry.transforms import inverse
 from handey_studio.grasping import gravity_in_hand
 from handey_studio.motion import Certificate, PathOptions, PathResult, Trajectory, certify, plan_path, time_path
-from handey_studio.task.ends import End, held_part
+from handey_studio.task.ends import End
 from handey_studio.task.grasps import CLOSED_MARGIN_M, Grasp, finger_pairs, grip_of, plain, slipping
 from handey_studio.task.options import Pairs
 from handey_studio.task.plan import Carry, Step, StepKind
+from handey_studio.task.removal import held_part
 from handey_studio.world import Held, World, arm_of
 from handey_studio.world.collision import collision_model
 
@@ -79,7 +80,7 @@ def join(
         _note(kept[key], what, world.robot.holding(np.array([a, b])), Posture(plain(b), (), opening, goal.instance.name), entry, ledger)
         return kept[key] if kept[key].found else None
 
-    lifted, raised = pickup.away.q_rad[-1], putdown.towards.q_rad[0]
+    lifted, raised = (pickup.led or pickup.away).q_rad[-1], (putdown.led or putdown.towards).q_rad[0]
     transfer = free(goal.carried, lifted, raised, choice.width, held, "of the transfer")
     there = transfer and free(goal.at_start, start.q, pickup.towards.q_rad[0], choice.opening, None, "to the pickup")
     home = there and last and free(goal.at_goal, putdown.away.q_rad[-1], start.q_home, choice.opening, None, "home")
@@ -99,7 +100,7 @@ def join(
         return None
     margin = min(float(goal.at_start.robot.limit_margin(step.q_rad).min()) for step in steps)
     choice = replace(choice, joint_margin=margin, grip=grip)
-    carry = Carry(grasp.option.T_world_start, goal.T_world_goal, choice, grasp.approach, transfer.space)
+    carry = Carry(grasp.option.T_world_start, goal.T_world_goal, choice, grasp.approach, transfer.space, 0, pickup.run, putdown.run)
     return Carried(carry, steps, certificate, steps[-1].q_rad[-1], choice.opening)
 
 
@@ -125,7 +126,7 @@ def _steps(
         ("approach", goal.at_start, pickup.towards, (wide, wide), None, ()),
         ("close", goal.at_start, pickup.q, (wide, tight), None, grip),
         ("lift", goal.carried, pickup.away, (tight, tight), held, grip + lift_pairs),
-        ("transfer", goal.carried, transfer, (tight, tight), held, grip),
+        *[("transfer", goal.carried, way, (tight, tight), held, grip) for way in (pickup.led, transfer, putdown.led) if way],
         ("place", goal.carried, putdown.towards, (tight, tight), held, grip + place_pairs),
         ("open", goal.at_goal, putdown.q, (tight, wide), None, grip),
         ("retreat", goal.at_goal, putdown.away, (wide, wide), None, ()),

@@ -6,41 +6,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Ledger, Posture, Value, frozen_array
-from handey_studio.grasping import HAND_MARGIN_M
+from handey_studio.grasping import HAND_MARGIN_M, BumpRun
 from handey_studio.motion import PathResult, straight_path
 from handey_studio.task.grasps import Grasp, hand_posture
 from handey_studio.task.options import Pairs
+from handey_studio.task.removal import STAGES, Removal, held_part, raised, removal_hands, straight_up
 from handey_studio.world import Held, World, arm_of
 from handey_studio.world.collision import collision_model
 
-HEIGHTS_M = (0.06, 0.10, 0.14, 0.18)  # straight up from where the part stands: the first at which nothing is near any more
-CLEAR_M = 0.003
-STRAIGHT_STEP_M = 0.005
 MIN_JOINT_MARGIN_RAD = np.deg2rad(3.0)
 PICKUP, PUTDOWN = "pickup", "putdown"
 
 
 @dataclass(frozen=True, eq=False)
 class End(Value):
-    """The straight motions at one end for one IK branch `q` (joints,) [rad]: in towards the part, and away from it."""
+    """The straight motions at one end for one IK branch `q` (joints,) [rad]: in towards the part, and away from it.
+
+    Where the part in hand does not go straight up or down all the way, `led` is the rest, out of the pickup or into the putdown, and `run`
+    what led it, in the direction of time.
+    """
 
     q: NDArray
     towards: PathResult
     away: PathResult
+    led: PathResult | None = None
+    run: BumpRun | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "q", frozen_array(self.q))
 
-
-def held_part(grasp: Grasp) -> Held:
-    """The part in the hand after this grasp."""
-    return Held(grasp.option.goal.instance.name, grasp.option.goal.instance.part, grasp.choice.T_hand_part)
+    @property
+    def q_carried(self) -> NDArray:
+        """Where the part is clear of everything at this end: the transfer begins or ends there."""
+        ...
 
 
 def reachable(grasp: Grasp, where: str, near: NDArray, ledger: Ledger) -> list[NDArray]:
     """Configurations (n,) that put the hand there within limits and clear of everything, nearest to `near` first."""
     goal, end = grasp.option.goal, 0 if where == PICKUP else 1
-    world, T_world_hand = (goal.at_start, grasp.T_world_hand_pickup) if end == 0 else (goal.at_goal, grasp.T_world_hand_putdown)
+    world, T_world_hand = (goal.at_start, goal.at_goal)[end], grasp.hands_at[end]
     arm, opening = arm_of(world.robot), grasp.choice.opening
     branches = arm.nearest_turns(arm.ik(T_world_hand), near)
     if not len(branches):
@@ -65,56 +69,54 @@ def reachable(grasp: Grasp, where: str, near: NDArray, ledger: Ledger) -> list[N
     return sorted(free, key=lambda q: float(np.abs(q - near).max()))
 
 
-def pickup_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> End | None:
-    """Approach and lift with one IK branch."""
+def pickup_end(grasp: Grasp, q: NDArray, way: Removal | None, ledger: Ledger) -> End | None:
+    """Approach and lift with one IK branch: straight up, or led out by a `way`."""
     goal, choice = grasp.option.goal, grasp.choice
-    into = _straight(grasp, goal.at_start, q, grasp.approach_hands[::-1], choice.opening, None, (), "approach", ledger)
-    if into is None:
+    into = _straight(grasp, 0, goal.at_start, q, grasp.approach_hands[::-1], choice.opening, None, (), "approach", ledger)
+    carried = _carried(grasp, 0, q, way, ledger) if into is not None else None
+    if into is None or carried is None:
         return None
-    lifted = _raised(grasp, grasp.T_world_hand_pickup)
-    away = _straight(grasp, goal.carried, q, lifted, choice.width, held_part(grasp), goal.supports_at_start, "lift", ledger)
-    return None if away is None else End(q, into.reversed(), away)
+    return End(q, into.reversed(), carried[0], carried[1], way.run if way else None)
 
 
-def putdown_end(grasp: Grasp, q: NDArray, ledger: Ledger) -> End | None:
-    """Placement and retreat with one IK branch."""
+def putdown_end(grasp: Grasp, q: NDArray, way: Removal | None, ledger: Ledger) -> End | None:
+    """Placement and retreat with one IK branch: the placement straight down, or led in by a `way` backwards."""
     goal, choice = grasp.option.goal, grasp.choice
-    raised = _raised(grasp, grasp.T_world_hand_putdown)
-    down = _straight(grasp, goal.carried, q, raised, choice.width, held_part(grasp), goal.supports_at_goal, "place", ledger)
-    if down is None:
+    carried = _carried(grasp, 1, q, way, ledger)
+    if carried is None:
         return None
-    away = _straight(grasp, goal.at_goal, q, grasp.retreat_hands, choice.opening, None, (), "retreat", ledger)
-    return None if away is None else End(q, down.reversed(), away)
+    away = _straight(grasp, 1, goal.at_goal, q, grasp.retreat_hands, choice.opening, None, (), "retreat", ledger)
+    up, led = carried
+    return None if away is None else End(q, up.reversed(), away, led.reversed() if led else None, way.run.reversed() if way else None)
+
+
+def _carried(grasp: Grasp, end: int, q: NDArray, way: Removal | None, ledger: Ledger) -> tuple[PathResult, PathResult | None] | None:
+    """How hand and part leave the place at one end: straight up all the way, or a bit and then along a way."""
+    goal, held, width, T_world_hand = grasp.option.goal, held_part(grasp), grasp.choice.width, grasp.hands_at[end]
+    pairs = (goal.supports_at_start, goal.supports_at_goal)[end]
+    hands = straight_up(T_world_hand, way.bit) if way else raised(grasp, T_world_hand)
+    up = _straight(grasp, end, goal.carried, q, hands, width, held, pairs, ("lift", "place")[end], ledger)
+    if up is None or way is None:
+        return None if up is None else (up, None)
+    led = _straight(grasp, end, goal.carried, up.q_rad[-1], removal_hands(grasp, end, way), width, held, (), STAGES[end], ledger)
+    return None if led is None else (up, led)
 
 
 def _part_at(grasp: Grasp, end: int) -> tuple[str, tuple[float, ...]]:
-    posture = hand_posture(grasp.option, grasp.T_world_hand_pickup, grasp.choice.opening, end)
+    posture = hand_posture(grasp.option, grasp.hands_at[0], grasp.choice.opening, end)
     return posture.part, posture.T_world_part
 
 
 def _straight(
-    grasp: Grasp, world: World, q: NDArray, hands: NDArray, opening: float, held: Held | None, pairs: Pairs, what: str, ledger: Ledger
-) -> PathResult | None:
+    grasp: Grasp, end: int, world: World, q: NDArray, hands: NDArray, opening: float, held: Held | None, pairs: Pairs, what: str,
+    ledger: Ledger,
+) -> PathResult | None:  # fmt: skip
     found = straight_path(world, q, hands, opening, held, pairs)
     if found.found:
         return found
     last = found.entries[-1] if found.entries else None
-    posture = Posture(tuple(q.tolist()), (), opening, *_part_at(grasp, 0 if what in ("approach", "lift") else 1))
+    posture = Posture(tuple(q.tolist()), (), opening, *_part_at(grasp, end))
     ledger.add("straight motion", what, found.reason, parent=grasp.entry, bodies=last.bodies if last else (),
                value=last.value if last else None, limit=last.limit if last else None, unit=last.unit if last else "",
                posture=posture)  # fmt: skip
     return None
-
-
-def _raised(grasp: Grasp, T_world_hand: NDArray) -> NDArray:
-    """Hand poses (k, 4, 4) straight up from one, until the part and the hand are clear of all that they stood beside."""
-    model, held = collision_model(grasp.option.goal.carried), held_part(grasp)
-    height = HEIGHTS_M[-1]
-    for height in HEIGHTS_M:
-        raised = T_world_hand.copy()
-        raised[2, 3] += height
-        if model.hand_contact(raised, grasp.choice.width, held, limit=2 * CLEAR_M).keeps(CLEAR_M):
-            break
-    poses = np.repeat(T_world_hand[None], 1 + round(height / STRAIGHT_STEP_M), axis=0)
-    poses[:, 2, 3] += np.linspace(0.0, height, len(poses))
-    return poses

@@ -45,13 +45,15 @@ class Fall:
 
 @dataclass(frozen=True, eq=False)
 class Grasp(Value):
-    """A grasp that can be approached: hand poses at both ends and the way in. `approach_hands` (k, 4, 4) ends at the pickup."""
+    """A grasp that can be approached: hand poses at both ends and the way in. `approach_hands` (k, 4, 4) ends at the pickup,
+    `retreat_hands` (m, 4, 4) begins at the putdown. `side` tells the hand's two ways round apart, as in `hand_in_plane`."""
 
     option: Option
     choice: GraspChoice
     approach: BumpRun
     approach_hands: NDArray
     retreat_hands: NDArray
+    side: int
     entry: int
 
     def __post_init__(self) -> None:
@@ -59,12 +61,14 @@ class Grasp(Value):
         object.__setattr__(self, "retreat_hands", frozen_array(self.retreat_hands))
 
     @property
-    def T_world_hand_pickup(self) -> NDArray:
-        return self.approach_hands[-1]
+    def hands_at(self) -> tuple[NDArray, NDArray]:
+        """The hand (4, 4) at the pickup and at the putdown."""
+        return self.approach_hands[-1], self.retreat_hands[0]
 
     @property
-    def T_world_hand_putdown(self) -> NDArray:
-        return self.retreat_hands[0]
+    def parts_at(self) -> tuple[NDArray, NDArray]:
+        """The part (4, 4) there."""
+        return self.option.T_world_start, self.option.goal.T_world_goal
 
 
 def hand_posture(option: Option, T_world_hand: NDArray, opening: float, end: int) -> Posture:
@@ -160,7 +164,7 @@ def grasps_at(
         )
         choice = _choice(option, rotations, approach, inverse(option.T_world_start) @ hands[-1], (tilt(hands[-1]), tilt(back[0])), grip)
         turned = ledger.add("hand", "one way round" if side > 0 else "the other way round", parent=entry)
-        found.append(Grasp(option, choice, approach.run, hands, back, turned))
+        found.append(Grasp(option, choice, approach.run, hands, back, side, turned))
     return found
 
 

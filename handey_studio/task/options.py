@@ -20,7 +20,7 @@ Pairs = tuple[tuple[str, str], ...]
 
 OPENED_LESS = ", opened less"  # ends the names of such options
 OPENED_LESS_COST = 0.3  # [rad of tilt] what it is worth to pass the part at a distance
-CLIMB_M = (0.004, 0.012, 0.03, 0.06)  # the part alone must be free at these heights above both its places
+LAST_BIT_M = 0.006  # that far, at least, a part is lifted straight up and put straight down: what is nearer above it lies on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +106,14 @@ def check_goal(
         words = "the part would fall over at the destination: its centre of mass is not above what it stands on"
         ledger.fall(entry, words, value=beyond, limit=0.0, unit="m")
         return None
-    if _in_the_way(beside, "something lies on the part where it is", placed.name, entry, ledger):
+    lies = "something lies or leans on the part where it is"
+    lifts = (
+        (beside, lies),
+        (neighbours(carried, raised(instance, LAST_BIT_M)), lies),
+        (neighbours(carried, raised(placed, LAST_BIT_M)), "there is no room above the part at the destination"),
+    )
+    if any(_in_the_way(met, what, placed.name, entry, ledger) for met, what in lifts):
         return None
-    for standing, what in ((instance, "the part cannot be lifted straight up"), (placed, "the part cannot be lowered straight down")):
-        for height in CLIMB_M:
-            if _in_the_way(neighbours(carried, raised(standing, height)), what, placed.name, entry, ledger):
-                return None
     at_start = tuple((instance.name, neighbour.name) for neighbour in beside)
     at_goal = tuple((instance.name, neighbour.name) for neighbour in near if neighbour.gap <= TOUCHING_M)
     return Goal(instance, label, T_world_goal, entry, world, carried, carried.with_part(placed), at_start, at_goal)

@@ -88,7 +88,8 @@ class Carry(Value):
     """One pickup and putdown of a plan: all of it, or a stretch between two regrasps.
 
     Poses (4, 4); the start may be named by another symmetry of the part than the goal of the carry before. `approach` is the bump-line run
-    at the pickup, `space` the configuration space of the transfer, `first_step` the plan's first step that belongs to it.
+    at the pickup, `space` the configuration space of the transfer, `first_step` the plan's first step that belongs to it. `lifting` and
+    `lowering` are those that led the part in hand out of its place and into the other, None where it went straight up and straight down.
     """
 
     T_world_part_start: NDArray
@@ -97,6 +98,8 @@ class Carry(Value):
     approach: BumpRun
     space: CSpaceSummary | None = None
     first_step: int = 0
+    lifting: BumpRun | None = None
+    lowering: BumpRun | None = None
 
     def __post_init__(self) -> None:
         for key in ("T_world_part_start", "T_world_part_goal"):

@@ -23,6 +23,7 @@ from handey_studio.task.ends import PICKUP, PUTDOWN, End, pickup_end, putdown_en
 from handey_studio.task.grasps import Approach, Grasp, approach_at, fall_illegal, grasp_plane_at, grasps_at
 from handey_studio.task.options import Goal, Option, options_of
 from handey_studio.task.plan import Carry, MovePlan, Step
+from handey_studio.task.removal import Known, removal
 from handey_studio.task.ruled_out import RuledOut, grasp_ruled_out, place_ruled_out, way_ruled_out
 from handey_studio.task.stages import APPROACH, DETOUR, PATHS, REACH, ROTATIONS, STAGES, STRAIGHT, left
 
@@ -32,6 +33,7 @@ TURN_COST = 0.3  # a radian of the joint that turns most counts as so many radia
 USUAL_TURN_RAD = 2.5  # which is what it turns by as long as nobody knows better
 REGRASP_S = 2.0  # each time that the part is put down on the way
 DETOUR_COST = 1.0  # [rad] each further place to put it down is worth that much less
+LED_COST = 0.5  # [rad] what it is worth to lift the part straight up and put it straight down
 ALIKE_RAD = 0.35  # configurations that differ by less than this in every joint are neighbours
 NEIGHBOUR_S = 1.0  # for each neighbour whose arm motion was not found
 
@@ -91,6 +93,7 @@ class OptionSearch:
     _planes: dict[tuple, GraspPlane] = field(default_factory=dict)
     _approaches: dict[tuple, Approach] = field(default_factory=dict)
     _ends: dict[tuple, End | None] = field(default_factory=dict)
+    _removals: Known = field(default_factory=dict)
     _lost: list[NDArray] = field(default_factory=list)
 
     @property
@@ -227,19 +230,26 @@ class OptionSearch:
         for a in pickups:
             for b in putdowns:
                 turns = float(np.abs(a - q).max() + np.abs(b - a).max() + np.abs(b - a)[held].sum())
-                self._push(Node(STRAIGHT, node.route, (grasp, a, b), node.cost + TURN_COST * turns, node.entry))
+                self._push(Node(STRAIGHT, node.route, (grasp, a, b, False), node.cost + TURN_COST * turns, node.entry))
 
     def _straight(self, node: Node) -> None:
-        grasp, a, b = node.what
-        pickup = self._end(grasp, PICKUP, a)
-        putdown = self._end(grasp, PUTDOWN, b) if pickup is not None else None
+        """Straight up and straight down; where that is barred the part may be led, as another option."""
+        grasp, a, b, led = node.what
+        pickup = self._end(grasp, PICKUP, a, led)
+        putdown = self._end(grasp, PUTDOWN, b, led) if pickup is not None else None
         if pickup is not None and putdown is not None:
             self._push(Node(PATHS, node.route, (grasp, pickup, putdown), node.cost, node.entry))
+        elif not led:
+            self._push(node._replace(what=(grasp, a, b, True), cost=node.cost + LED_COST))
 
-    def _end(self, grasp: Grasp, where: str, q: NDArray) -> End | None:
-        key = (grasp, where, q.tobytes())
+    def _end(self, grasp: Grasp, where: str, q: NDArray, led: bool) -> End | None:
+        """The motions at one end, led where straight ones were barred."""
+        key = (grasp, where, q.tobytes(), led)
         if key not in self._ends:
-            self._ends[key] = (pickup_end if where == PICKUP else putdown_end)(grasp, q, self.ledger)
+            straight = self._end(grasp, where, q, False) if led else None
+            way = removal(grasp, (PICKUP, PUTDOWN).index(where), self._removals, self.ledger) if led and straight is None else None
+            plan = pickup_end if where == PICKUP else putdown_end
+            self._ends[key] = straight if led and way is None else plan(grasp, q, way, self.ledger)
         return self._ends[key]
 
     def _paths(self, node: Node) -> MovePlan | None:

@@ -19,7 +19,7 @@ from handey_studio.app.setting_up import ChoosePart
 from handey_studio.app.state import Handled, opened
 from handey_studio.base import Ledger
 from handey_studio.geometry.transforms import apply
-from handey_studio.grasping import GOAL, START, ForbiddenRange, GraspPlane, plan_approach
+from handey_studio.grasping import GOAL, START, ForbiddenRange, GraspPlane, hand_outline, plan_approach
 from handey_studio.session.handling import handling
 from tests.session.samples import fresh_session, full_session, library
 
@@ -74,7 +74,7 @@ def test_the_plane_shows_the_bump_lines_that_touch_at_the_iteration_of_the_hand(
     hand, heap = state.robot.hand, np.zeros((400, 400), dtype=bool)
     heap[160:192, :140] = heap[208:, :140] = True  # a gap between two heaps, hardly wider than the hand
     plane = GraspPlane(state.carry.approach.plane.T_world_plane, np.array([-0.4, -0.25]), 0.002, heap, heap)
-    run = plan_approach(plane, hand, np.array([0.004, 0.08, -np.pi / 2]), np.array([0.0, 0.0]))
+    run = plan_approach(plane, hand_outline(hand), np.array([0.004, 0.08, -np.pi / 2]), np.array([0.0, 0.0]))
     told = run.iterations
     k = int(np.argmax(told.colliding.sum(axis=1)))
     assert told.colliding[k].any(), "the heaps are near enough"

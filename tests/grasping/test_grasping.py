@@ -10,7 +10,7 @@ from handey_studio.grasping import (
     hand_in_plane,
     plan_approach,
 )
-from handey_studio.grasping.bump_lines import hand_rectangles
+from handey_studio.grasping.hand_outline import hand_outline, hand_rectangles
 from handey_studio.world import Library, PlacedPart, World, hand_hulls
 
 LIBRARY = Library.choose()
@@ -66,7 +66,7 @@ def approach(world, part, T_world_part, group):
     plane = fill_grasp_plane(world, T_world_plane, group.point, HAND, opening)
     along = np.array([np.cos(group.angle), np.sin(group.angle)])
     start = np.append(group.point - (0.08 + group.depth) * along, group.angle)
-    return plan_approach(plane, HAND, start, group.point), T_world_plane, opening
+    return plan_approach(plane, hand_outline(HAND), start, group.point), T_world_plane, opening
 
 
 def from_above(part, T_world_part):

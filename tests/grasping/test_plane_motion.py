@@ -21,13 +21,13 @@ from handey_studio.grasping import (
     hand_outline,
     outline_with,
     plan_grasp_motion,
-    plan_lowering,
+    plan_removal,
     plan_retreat,
     plane_space,
 )
 from handey_studio.grasping.grasp_plane import CELL_M, half_size
 from handey_studio.grasping.hand_outline import overlaps
-from handey_studio.grasping.plane_search import BIN_M, way_out
+from handey_studio.grasping.plane_search import BIN_M, beyond, way_out
 from handey_studio.world import Block, Held, Library, PlacedPart, World
 from handey_studio.world.collision import collision_model
 
@@ -117,7 +117,7 @@ def test_the_search_agrees_with_an_exhaustive_one(seed):
     tight = naive_reached(space, clearances, margin)
     wide = naive_reached(space, clearances, np.sqrt(2) * (margin + BIN_M + CELL_M))
     middle = np.array(space.blocked.shape) // 2
-    found = way_out(space, middle[None], np.zeros(len(space.angles)), COARSE.out)
+    found = way_out(space, middle[None], np.where(beyond(space, COARSE.out), 0.0, np.inf)[None])
 
     def leads_out(reached):
         return any(np.hypot(*(np.array(n)[1:] - middle[1:])) * COARSE.step >= COARSE.out for n in reached)
@@ -200,30 +200,70 @@ def test_free_ways_are_straight():
         assert np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1).max() <= 0.0021
 
 
-@pytest.mark.parametrize("roof", [False, True])
-def test_a_part_is_lowered_beside_an_overhang(roof):
-    """A shelf hangs over the place: the part comes from the side, and hand and part stay clear of all on the way there."""
-    T_world_part = from_xyz_rpy((0.5, 0.0, 0.02))
+BIT_M = 0.012  # the part in hand has been lifted by so much
+
+
+def held_above(world, yaw=0.0):
+    """A brick in the hand from above, a bit over the table: its grasp plane with both filled in, their outline, and the pose there."""
+    T_world_part = from_xyz_rpy((0.5, 0.0, 0.015 + BIT_M), (0.0, 0.0, yaw))
     group = min(
         grasp_groups(BRICK, HAND)[0], key=lambda g: (T_world_part @ g.grasp_class.T_part_plane @ hand_in_plane(g.point, g.angle, 1))[2, 2]
     )
-    T_world_plane = T_world_part @ group.grasp_class.T_part_plane
     held = Held("brick#1", BRICK, inverse(group.grasp_class.T_part_plane @ hand_in_plane(group.point, group.angle, 1)))
-    flat = int(np.argmin(np.abs(T_world_plane[2, 1:3])))  # the plane's horizontal axis
-    to_side = T_world_plane[:3, 1 + flat]
-    middle = np.array([0.5, 0.0, 0.20]) - 0.17 * to_side
-    shelf = Block("shelf", (0.28, 0.28, 0.01), from_xyz_rpy(middle))
-    world = World(ROBOT, blocks=(shelf,) if roof else ())
     outline, ends = outline_with(HAND, held)
-    plane = fill_grasp_plane(world, T_world_plane, group.point, HAND, group.grasp_class.width, ends)
+    width = group.grasp_class.width
+    plane = fill_grasp_plane(world, T_world_part @ group.grasp_class.T_part_plane, group.point, HAND, width, ends)
+    return plane, outline, np.array([*group.point, group.angle]), held, width
+
+
+def clearances(world, plane, path, held, width, up=0.0):
+    """Oracle: how far hand and part are from everything by the exact collision model, so much higher."""
+    hands = [plane.T_world_plane @ hand_in_plane(pose[:2], pose[2], 1) for pose in path]
+    return [collision_model(world).hand_contact(from_xyz_rpy((0, 0, up)) @ hand, width, held, limit=0.01).distance for hand in hands]
+
+
+def board(plane, low, high, z, name="board"):
+    """A board over the plane, from low to high [m] along the plane's horizontal direction, with its underside at z."""
+    level = plane.T_world_plane[:3, 1 + int(np.argmin(np.abs(plane.T_world_plane[2, 1:3])))]
+    T = from_xyz_rpy((*((0.5, 0.0) + (low + high) / 2 * level[:2]), z + 0.005), (0.0, 0.0, np.arctan2(level[1], level[0])))
+    return Block(name, np.array([high - low, 0.3, 0.01]), T)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "status"), [(0.2, 0.3, "reached"), (-0.3, 0.03, "reached"), (-0.12, 0.12, "reached"), (-0.6, 0.6, "no way")]
+)
+def test_a_part_in_hand_is_led_out_from_under_a_board(low, high, status):
+    """Hand and part stay clear of all on the way, and at its end nothing is above them; under a board without end there is no way out."""
+    above = board(held_above(World(ROBOT))[0], low, high, 0.20)
+    world = World(ROBOT, blocks=(above,))
+    plane, outline, pose, held, width = held_above(world)
     assert plane.held.any()
-    run = plan_lowering(plane, outline, np.array([*group.point, group.angle]))
-    assert run.status == "reached" and np.allclose(run.path[-1], [*group.point, group.angle])
-    model = collision_model(world)
-    grip = (("finger_left", held.name), ("finger_right", held.name))
-    for pose in run.path[:-30:4]:
-        T_world_hand = T_world_plane @ hand_in_plane(pose[:2], pose[2], 1)
-        assert model.hand_contact(T_world_hand, group.grasp_class.width, held, grip).distance > 0
+    run = plan_removal(plane, outline, pose)
+    assert run.status == status
+    if status == "reached":
+        assert np.allclose(run.path[0], pose) and (low > 0.1) <= (run.found_by == "bump lines")
+        assert min(clearances(world, plane, run.path, held, width)) > 0.0
+        assert min(min(clearances(world, plane, run.path[-1:], held, width, up)) for up in np.arange(0.0, 0.4, 0.005)) > 0.0
+        assert np.array_equal(run.reversed().path, run.path[::-1]) and np.array_equal(run.reversed().goal, pose[:2])
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 10**6))
+def test_a_removal_is_free_in_the_world_and_ends_in_the_open(seed):
+    rng = np.random.default_rng(seed)
+    blocks = tuple(
+        Block(f"b{k}", rng.uniform(0.02, 0.09, 3), from_xyz_rpy((0.5 + x, y, rng.uniform(0.02, 0.24)), (0, 0, rng.uniform(-3, 3))))
+        for k, (x, y) in enumerate(rng.uniform(-0.2, 0.2, (7, 2)))
+    )
+    world = World(ROBOT, blocks=blocks)
+    plane, outline, pose, held, width = held_above(world, rng.uniform(-3, 3))
+    if min(clearances(world, plane, pose[None], held, width)) < 0.006:
+        return
+    run = plan_removal(plane, outline, pose)
+    assert run.status in ("reached", "no way")
+    if run.status == "reached":
+        assert min(clearances(world, plane, run.path, held, width)) > -0.0005
+        assert min(min(clearances(world, plane, run.path[-1:], held, width, up)) for up in np.arange(0.0, 0.4, 0.005)) > -0.0005
 
 
 @settings(max_examples=20, deadline=None)

@@ -10,7 +10,7 @@ from handey_studio.app.palette import FILLED, RGB
 from handey_studio.app.pictures.part import part_in_plane
 from handey_studio.app.pictures.svg import PlaneView, arrow, circle, picture_uri, polygon, polyline, svg, words
 from handey_studio.grasping import BumpIterations, BumpOptions, BumpRun, GraspPlane, bump_lines
-from handey_studio.grasping.hand_outline import hand_rectangles
+from handey_studio.grasping.hand_outline import hand_outline, hand_rectangles
 from handey_studio.task.plan import GraspChoice
 from handey_studio.world import Hand, Part
 
@@ -89,7 +89,7 @@ def iteration_at(run: BumpRun, hand: Hand, pose: NDArray) -> tuple[BumpIteration
 
     None if the run kept none, or those of a hand with other bump lines.
     """
-    told, lines = run.iterations, len(bump_lines(hand, BumpOptions()).vectors)
+    told, lines = run.iterations, len(bump_lines(hand_outline(hand), BumpOptions()).vectors)
     k = 0 if told is None else len(told.poses)
     shapes = [] if told is None else [told.poses.shape, told.colliding.shape, told.multipliers.shape, told.free.shape, told.rules.shape]
     if (
@@ -138,7 +138,7 @@ def _hand(view: PlaneView, hand: Hand, pose: NDArray, colour: RGB, opacity: floa
 
 def _iteration(view: PlaneView, run: BumpRun, hand: Hand, pose: NDArray) -> list[str]:
     """Bump lines, near solid and far dashed; bump vectors as long as their multipliers; the free motion vector; the unit circle."""
-    lines, found = bump_lines(hand, BumpOptions()), iteration_at(run, hand, pose)
+    lines, found = bump_lines(hand_outline(hand), BumpOptions()), iteration_at(run, hand, pose)
     at = pose if found is None else found[0].poses[found[1]]
     touching = np.zeros(len(lines.vectors), dtype=bool) if found is None else found[0].colliding[found[1]]
     axes, drawn = _axes(at[2]), []
