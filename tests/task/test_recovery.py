@@ -1,16 +1,18 @@
 """MOVEs in a cell that gets into trouble: each kind is noticed, told, put right, and never called done when it is not."""
 
 import json
+import threading
 
 import numpy as np
 import pytest
 
+from handey_studio.cell.protocol import Moved
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.session import Session, session_from_bytes, session_to_bytes
-from handey_studio.task import MoveCommand
+from handey_studio.task import MoveCommand, MoveOptions, run_move
 from handey_studio.task.acting.way_back import _reversed
 from handey_studio.task.report import move_report
-from tests.task.troubled import GOAL, LIBRARY, Troubled, moved, station, workcell
+from tests.task.troubled import COMMAND, GOAL, LIBRARY, Troubled, moved, station, workcell
 
 TROUBLES = ("missed", "dropped", "blocked", "early contact", "wrong place", "moved")
 
@@ -129,3 +131,43 @@ def test_the_way_back_begins_at_rest_wherever_on_a_step_the_arm_was_stopped(reco
         speed = np.abs(np.diff(back.q_rad, axis=0) / np.diff(back.time_s)[:, None]).max(axis=1)
         planned = np.abs(np.diff(transfer.q_rad, axis=0) / np.diff(transfer.time_s)[:, None]).max()
         assert speed.max() <= 0.5 * planned + 1e-9 and speed[0] < 0.1 * planned
+
+
+class Endless(Troubled):
+    """Its transfer ends only when the cell is told to stop."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.halt = threading.Event()
+
+    def stop(self) -> None:
+        self.halt.set()
+
+    def follow(self, motion):
+        done = super().follow(motion)
+        if self.carried != 2:
+            return done
+        return Moved("stopped", done.recording) if self.halt.wait(20.0) else done
+
+
+class Impatient:
+    """Cancels a moment after a step of this kind began."""
+
+    def __init__(self, kind: str) -> None:
+        self._kind, self._cancelled = kind, threading.Event()
+
+    def report(self, fraction: float, message: str) -> None:
+        if message.startswith("step") and message.endswith(self._kind):
+            threading.Timer(0.05, self._cancelled.set).start()
+
+    @property
+    def cancelled(self) -> bool:
+        return self._cancelled.is_set()
+
+
+def test_a_cancel_stops_the_arm_in_the_middle_of_a_motion():
+    cell = Endless()
+    result = run_move(station(), cell, COMMAND, MoveOptions(seed=1), progress=Impatient("transfer")).result
+    assert cell.halt.is_set() and (result.status, result.reason) == ("failed", "cancelled")
+    assert result.performance is not None and result.performance.performed[-1].what == "transfer"
+    assert cell.held_truly() == "brick", "what is held is not let go of, and nothing else is begun"

@@ -12,6 +12,7 @@ from handey_studio.task.acting.looking import changed, check_place, wrong_place
 from handey_studio.task.acting.perform import Performer, Task
 from handey_studio.task.acting.performance import Incident, Performance
 from handey_studio.task.acting.recover import RecoveryOptions, felt_block
+from handey_studio.task.acting.stopping import stopping
 from handey_studio.task.acting.way_back import CameBack, come_back
 from handey_studio.task.plan import MovePlan
 from handey_studio.task.planning import Station, sense
@@ -47,9 +48,10 @@ def attempt(
         return Tried(Performance(incidents=(moved,)), moved, q=cell.joints(), seen=seen)
     world = _with_felt(believed_world(station.workcell, station.robot, scene), felt)
     performer = Performer(Task(plan, station.models[plan.part.split("#")[0]], world.without(plan.part)), cell)
-    incident = performer.perform(Share(progress, 0.0, ACTED))
-    if incident is not None:
-        return _brought_back(performer, incident, progress)
+    with stopping(cell, progress):
+        incident = performer.perform(Share(progress, 0.0, ACTED))
+        if incident is not None:
+            return _brought_back(performer, incident, progress)
     return _looked_at(station, scene, plan, performer.told(), cell, options, seed, Share(progress, ACTED, 1.0))
 
 

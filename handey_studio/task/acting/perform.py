@@ -58,10 +58,10 @@ class Performer:
         """Every step, until something goes otherwise than planned: that, or None when all is done."""
         steps = self.task.plan.steps
         for number, step in enumerate(steps):
+            progress.report(number / len(steps), f"step {number + 1} of {len(steps)}: {step.kind}")
+            incident = None if progress.cancelled else self._do(number, step)
             if progress.cancelled:
                 return self._noticed(Incident("stopped", number, "cancelled"))
-            progress.report(number / len(steps), f"step {number + 1} of {len(steps)}: {step.kind}")
-            incident = self._do(number, step)
             if incident is not None:
                 return self._noticed(incident)
         return None
