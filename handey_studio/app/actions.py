@@ -1,6 +1,7 @@
 """What a user can ask for that reaches beyond the state: an action's `run` is given the workbench, and returns the next state. Raises
 BadInput with one sentence."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -20,6 +21,7 @@ class Bench(Protocol):
     planner: Any
 
     def client(self, number: int | None) -> Any: ...
+    def recorded(self, states: Sequence[State], period_s: float) -> str: ...
     def look(self, position: NDArray, look_at: NDArray, client: int | None) -> None: ...
 
 

@@ -66,7 +66,7 @@ class View:
         scenes += [CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
         server.gui.add_html(PAGE)
         session = SessionPanel(server, send)
-        self._of_move: list[Pane] = scenes
+        self._scenes: list[Pane] = scenes
         models: list[Pane] = [ScanScene(server), SolidScene(server), ClickScenes(server, send), GizmoScene(server, send)]
         self._panes: list[Pane] = [*models, session, *_left(server.gui, send), *_right(server.gui, send), TimelinePanel(server.gui, send)]
         server.gui.main_panel.dock_right()
@@ -75,18 +75,28 @@ class View:
 
     def render(self, old: State | None, new: State) -> tuple[str, ...]:
         """Draw what differs. A pane that breaks down is left as it is, logged, and its name returned: the others are drawn all the same."""
-        of_move = (None if old is None else aside(looking_back(old)), aside(looking_back(new)))
         broken = []
         with self._server.atomic():
             if old is None or old.dark != new.dark:
                 self._server.gui.configure_theme(dark_mode=new.dark, show_logo=False, show_share_button=False, brand_color=palette.BLUE)
-            for pane, states in [*((pane, of_move) for pane in self._of_move), *((pane, (old, new)) for pane in self._panes)]:
+            of_move = _of_move(old, new)
+            for pane, states in [*((pane, of_move) for pane in self._scenes), *((pane, (old, new)) for pane in self._panes)]:
                 try:
                     pane.render(*states)
                 except Exception:
                     log.exception("%s could not be drawn", type(pane).__name__)
                     broken.append(type(pane).__name__)
         return tuple(broken)
+
+    def draw_scene(self, old: State, new: State) -> None:
+        """Draw what differs in the scene of the MOVE alone."""
+        for pane in self._scenes:
+            pane.render(*_of_move(old, new))
+
+
+def _of_move(old: State | None, new: State) -> tuple[State | None, State]:
+    """What the scene of the MOVE shows of two states."""
+    return None if old is None else aside(looking_back(old)), aside(looking_back(new))
 
 
 def _left(gui: viser.GuiApi, send: Send) -> list[Any]:

@@ -4,7 +4,8 @@ import logging
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,17 @@ class Workbench:
                 with handle.atomic():
                     handle.camera.position = position * SCALE
                     handle.camera.look_at = look_at * SCALE
+
+    def recorded(self, states: Sequence[State], period_s: float) -> str:
+        """A page (HTML) that shows the scene of each state in turn, for so long [s]; browsers see none of it."""
+        recording = self.server.get_scene_serializer()
+        with self.server.atomic():
+            for before, state in pairwise((self.state, *states)):
+                self._view.draw_scene(before, state)
+                recording.insert_sleep(period_s)
+            page = recording.as_html(dark_mode=self.state.dark)
+            self._view.draw_scene(states[-1], self.state)
+        return page
 
     def _loop(self) -> None:
         last = time.monotonic()

@@ -126,6 +126,10 @@ def test_download_and_upload_round_trip(studio, visit, tmp_path):
         press(page, "Download")
     caught.value.save_as(tmp_path / "back.handey")
     before = workbench.state.session
+    with page.expect_download() as caught:
+        press(page, "Replay as a page")
+    caught.value.save_as(tmp_path / "replay.html")
+    assert "__VISER_EMBED_DATA__=" in (tmp_path / "replay.html").read_text() and workbench.state.session == before
     press(page, "New")
     wait_until(lambda: workbench.state.session.scene is None)
     press(page, "Open")

@@ -5,7 +5,7 @@ import viser
 
 from handey_studio.app import html, palette
 from handey_studio.app.cspace import slice_html
-from handey_studio.app.exporting import ExportPlan
+from handey_studio.app.exporting import ExportPlan, ExportReplay
 from handey_studio.app.guidance import UNSEEN, unseen
 from handey_studio.app.panels.running import HappenedPanel
 from handey_studio.app.state import State
@@ -28,6 +28,10 @@ class ResultPanel:
         self._happened = HappenedPanel(gui, send)
         self._timing = gui.add_html("")
         self._export = gui.add_button_group("Export", tuple(EXPORTS), visible=False, hint="Download the plan, after a dry check")
+        self._replay = gui.add_button(
+            "Replay as a page", icon=viser.Icon.MOVIE, color="gray", visible=False, hint="One file that any browser plays by itself"
+        )
+        on_click(self._replay, send, lambda event: ExportReplay(event.client_id))
         on_click(self._export, send, lambda event: ExportPlan(EXPORTS[event.target.value], event.client_id))
 
     def render(self, old: State | None, new: State) -> None:
@@ -38,6 +42,7 @@ class ResultPanel:
         self._pane.content = result_html(result) if result else html.empty(NO_RESULT, "result-empty")
         self._timing.content = timing_html(result) if result else ""
         set_to(self._export, visible=new.attempt is not None)
+        set_to(self._replay, visible=new.attempt is not None)
 
 
 class PathPanel:
