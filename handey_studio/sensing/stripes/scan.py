@@ -17,15 +17,16 @@ from handey_studio.sensing.stripes.fusing import ScanArea, fuse_readings, inside
 from handey_studio.sensing.stripes.instrument import MAX_CELL_M, MAX_SIDE_CELLS, Instrument
 from handey_studio.sensing.stripes.photographs import Photograph, dark_frame_of, list_photographs, read_photograph
 from handey_studio.sensing.stripes.stripe_camera import StripeCamera, points_on_planes
-from handey_studio.sensing.stripes.stripe_light import LaserColour, laser_colour, laser_light
-from handey_studio.sensing.stripes.stripe_peaks import PeakOptions, StripePeaks, find_peaks, stripe_direction
+from handey_studio.sensing.stripes.stripe_light import LaserColour, laser_light
+from handey_studio.sensing.stripes.stripe_look import how_it_looks, sampled
+from handey_studio.sensing.stripes.stripe_peaks import PeakOptions, StripePeaks, find_peaks
 
-SAMPLES = 5  # photographs by which the laser's colour and the stripe's direction are told
 MAX_POINTS = 20_000_000
 SPAN = (0.002, 0.998)  # quantiles of the readings that a depth map without a given area spans
 LEAST_NOISE_M = 1e-5
 NUDGE_PX = 0.25  # by which a peak is moved to see how far its point moves
 SPACING_LOOKS = 40  # photographs, and points of each, by which the stripes' spacing is measured
+APART = 17  # rows; more than twice what a peak is averaged with
 GRAZING = "grazing the plane"
 
 
@@ -123,13 +124,9 @@ def _groups(folder: Path, instrument: Instrument) -> list[list[Path]]:
 
 
 def _how_it_looks(group: Sequence[Path], darks: Sequence[Path | None], options: ScanOptions) -> tuple[LaserColour, str]:
-    """The laser's colour and the stripes' direction in a camera's photographs, from a few of them."""
-    few = np.unique(np.linspace(0, len(group) - 1, SAMPLES + 2).round().astype(int)[1:-1])
-    pairs = [(read_photograph(group[k]), None if (path := darks[k]) is None else read_photograph(path)) for k in few]
-    colour = laser_colour(pairs, options.channel)
-    if options.direction != "auto":
-        return colour, options.direction
-    return colour, stripe_direction([(laser_light(one, dark, colour), one.saturated) for one, dark in pairs], options.peaks)
+    """The laser's light and the stripes' direction in a camera's photographs, from a few of them."""
+    few = [(read_photograph(group[k]), None if (dark := darks[k]) is None else read_photograph(dark)) for k in sampled(len(group))]
+    return how_it_looks(few, options.channel, options.direction, options.peaks)
 
 
 def _looks(
@@ -183,11 +180,20 @@ def look_at(peaks: StripePeaks, camera: StripeCamera, plane: NDArray, T_range_ri
 
 
 def _jitter(rows: NDArray, places: NDArray) -> NDArray:
-    """How far each peak lies off the middle of its neighbours in the next rows, scaled to a peak's own deviation [px]."""
-    if len(rows) < 3:
+    """How far each peak lies off the middle of those APART rows before and after it, scaled to a peak's own deviation [px].
+
+    Nearer ones share its error: what it was averaged with, and the surface's grain. In stripes too short for that the next rows serve.
+    """
+    if not len(rows):
         return np.zeros(0)
-    together = (np.diff(rows)[:-1] == 1) & (np.diff(rows)[1:] == 1)
-    return (places[1:-1] - 0.5 * (places[:-2] + places[2:]))[together] / np.sqrt(1.5)
+    first = int(rows.min())
+    run = np.full(int(rows.max()) - first + 1, np.nan)
+    run[rows.astype(int) - first] = places
+    for apart in (APART, 1):
+        off = (run[apart:-apart] - 0.5 * (run[: -2 * apart] + run[2 * apart :])) / np.sqrt(1.5)
+        if np.isfinite(off).any():
+            return off[np.isfinite(off)]
+    return np.zeros(0)
 
 
 def reading_noise(looks: Sequence[Look]) -> tuple[float, float]:

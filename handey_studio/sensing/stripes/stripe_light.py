@@ -48,6 +48,19 @@ def laser_colour(pairs: Sequence[tuple[Photograph, Photograph | None]], channel:
     return _colour_of_differences(pairs) if with_dark else _colour_of_excess(pairs)
 
 
+def other_lights(colour: LaserColour, with_dark: bool) -> list[LaserColour]:
+    """Lights of the same laser that may show a finer line than its own colour: single channels, and without a dark frame the laser's
+    channel alone or less one other."""
+    if with_dark:
+        return [LaserColour(weights, colour.name) for weights in SINGLE.values()]
+    own = SINGLE.get(colour.name)
+    if own is None:
+        return []
+    others = [other for name, other in SINGLE.items() if name != colour.name]
+    less = [(own[0] - other[0], own[1] - other[1], own[2] - other[2]) for other in others]
+    return [LaserColour(weights, colour.name) for weights in (own, *less)]
+
+
 def _colour_of_differences(pairs: Sequence[tuple[Photograph, Photograph | None]]) -> LaserColour:
     total = np.zeros(3)
     for photograph, dark in pairs:

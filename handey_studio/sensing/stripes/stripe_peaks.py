@@ -2,7 +2,7 @@
 
 The light of a row is smoothed a little, and what stays bright over more than a stripe's width is taken away. The strongest
 peak's centre of gravity is the stripe, unless another is nearly as strong: then one of the two is a reflection or another
-surface, and nobody can say which.
+surface, and nobody can say which. What the surface's grain does to a peak is averaged away along the stripe, where it is straight.
 """
 
 from collections.abc import Sequence
@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.base import BadInput
+from handey_studio.sensing.stripes.stripe_along import along, roughness
 
 DIRECTIONS = ("auto", "down", "across")
 REASONS = ("kept", "no stripe", "faint", "two peaks", "too wide", "at the border", "alone")
@@ -29,25 +30,30 @@ AROUND = 3  # rows on either side in which a peak looks for the rest of its stri
 class PeakOptions:
     """How peaks are found. `smooth_px` is the Gaussian's sigma along the row; `max_width_px` the stripe's greatest width, half way up.
 
-    A peak below `faint` of the photograph's strong ones is a reflection; one that another reaches to `tie` is one of two.
+    A peak below `faint` of the photograph's strong ones is a reflection; one that another reaches to `tie` is one of two. Where the
+    stripe is straight a peak is averaged with up to `along_px` rows on either side; 0 leaves each row alone.
     """
 
     smooth_px: float = 1.0
     max_width_px: int = 24
     faint: float = 0.04
     tie: float = 0.6
+    along_px: int = 8
 
 
 @dataclass(frozen=True, eq=False)
 class StripePeaks:
-    """Peaks (n, 2) [px] (u, v) of one photograph; their light, of 255, and widths (n,) [px] at half height.
+    """Peaks (n, 2) [px] (u, v) of one photograph; their light, of 255, widths (n,) [px] at half height, and which are `saturated` (n,).
 
-    `dropped` counts the rows (columns, for a stripe that runs across) without a peak, by reason.
+    `roughness` [px] is the deviation of single rows' peaks from the stripe's run, NaN for a stripe too short to tell. `dropped`
+    counts the rows (columns, for a stripe that runs across) without a peak, by reason.
     """
 
     uv: NDArray
     light: NDArray
     width: NDArray
+    saturated: NDArray
+    roughness: float
     dropped: dict[str, int]
 
 
@@ -57,7 +63,8 @@ def find_peaks(light: NDArray, saturated: NDArray, direction: str, options: Peak
         raise BadInput(f'a stripe runs "{direction}"; choose one of: {", ".join(DIRECTIONS)}.')
     across = direction == "across"
     rows = np.ascontiguousarray(light.T if across else light, dtype=np.float32)
-    signal, noise = _signal(rows, saturated.T if across else saturated, options)
+    full = saturated.T if across else saturated
+    signal, noise = _signal(rows, full, options)
     limit = max(LEAST_LIGHT, NOISE_FACTOR * noise)
     place, height, width, state = _row_peaks(signal, limit, options.max_width_px, options.tie)
     seen = state != NO_STRIPE
@@ -65,9 +72,12 @@ def find_peaks(light: NDArray, saturated: NDArray, direction: str, options: Peak
         state[seen & (height < options.faint * np.quantile(height[seen], 0.9))] = FAINT
     _drop_alone(place, state, AROUND)
     kept = np.flatnonzero(state == KEPT)
-    uv = np.stack([place[kept], kept.astype(float)], axis=1)
+    hot = full[kept, np.round(place[kept]).astype(int)]
+    run = np.where(state == KEPT, place, np.nan)
+    rough = roughness(run)
+    uv = np.stack([along(run, rough, options.along_px)[kept], kept.astype(float)], axis=1)
     dropped = {reason: int((state == number).sum()) for number, reason in enumerate(REASONS) if number != KEPT}
-    return StripePeaks(uv[:, ::-1].copy() if across else uv, height[kept], width[kept], dropped)
+    return StripePeaks(uv[:, ::-1].copy() if across else uv, height[kept], width[kept], hot, rough, dropped)
 
 
 def stripe_direction(lights: Sequence[tuple[NDArray, NDArray]], options: PeakOptions = PeakOptions()) -> str:
