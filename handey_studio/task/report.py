@@ -5,11 +5,14 @@ from typing import Any
 import numpy as np
 
 from handey_studio.base import entry_report, finite, rejected_counts
-from handey_studio.grasping import Grip
+from handey_studio.grasping import BumpRun, Grip
 from handey_studio.motion.answer import certificate_report
 from handey_studio.task.acting.report import performance_report
 from handey_studio.task.plan import Carry, GraspChoice, MoveResult, Step
+from handey_studio.task.removal import STAGES as REMOVALS
 from handey_studio.world import Robot
+
+OPTIONS = {"destination", "grasp group", "grasp class", "approach group", "approach", "reach", "straight motion", *REMOVALS, "arm motion"}
 
 
 def move_report(results: list[MoveResult], robot: Robot, recordings: bool = False) -> dict[str, Any]:
@@ -20,8 +23,7 @@ def move_report(results: list[MoveResult], robot: Robot, recordings: bool = Fals
 
 def _move(result: MoveResult, robot: Robot) -> dict[str, Any]:
     plan = result.plan
-    stages = {"destination", "grasp group", "grasp class", "approach group", "approach", "reach", "straight motion", "arm motion"}
-    options = [entry for entry in result.ledger if entry.stage in stages]
+    options = [entry for entry in result.ledger if entry.stage in OPTIONS]
     return {
         "part": plan.part if plan else result.command.part,
         "destination": result.command.to,
@@ -48,7 +50,14 @@ def _carry(carry: Carry) -> dict[str, Any]:
         "T_world_part_start": plain(carry.T_world_part_start),
         "T_world_part_goal": plain(carry.T_world_part_goal),
         "grasp": _grasp(carry.grasp),
+        "lifting": _led(carry.lifting),
+        "lowering": _led(carry.lowering),
     }
+
+
+def _led(run: BumpRun | None) -> dict[str, Any] | None:
+    """What led the part in hand; null where it went straight up, or straight down."""
+    return None if run is None else {"found_by": run.found_by, "T_world_plane": plain(run.plane.T_world_plane), "path": plain(run.path)}
 
 
 def _grasp(grasp: GraspChoice) -> dict[str, Any]:

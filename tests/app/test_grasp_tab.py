@@ -78,14 +78,14 @@ def test_the_plane_shows_the_bump_lines_that_touch_at_the_iteration_of_the_hand(
     told = run.iterations
     k = int(np.argmax(told.colliding.sum(axis=1)))
     assert told.colliding[k].any(), "the heaps are near enough"
-    assert iteration_at(run, hand, told.poses[k])[1] == k
+    assert iteration_at(run, hand_outline(hand), told.poses[k])[1] == k
     run = replace(run, path=np.vstack([told.poses[: k + 1], run.path[-1:]]))
     svg = grasp_plane_svg(run, hand, k)
     assert len(re.findall(r'stroke="#cc4c18" stroke-width="2.4"', svg)) == told.colliding[k].sum()
-    said = plane_words(run, hand, k)
+    said = plane_words(run, hand_outline(hand), k)
     assert f"Iteration {k + 1} of {len(told.poses)}" in said and f"{told.colliding[k].sum()} bump line" in said
     other = replace(hand, T_flange_hand=np.eye(4))  # without a mount, so with fewer bump lines
-    assert iteration_at(run, other, told.poses[k]) is None and "Iteration" not in plane_words(run, other, k)
+    assert iteration_at(run, hand_outline(other), told.poses[k]) is None and "Iteration" not in plane_words(run, hand_outline(other), k)
     assert grasp_plane_svg(run, other, k).count("unit circle") == 0
 
 

@@ -10,12 +10,13 @@ from handey_studio.app import html
 from handey_studio.app.grasp_commands import LookAtStanding, LookAway, PickCell, PickClass, ShowObstacles, looked_at
 from handey_studio.app.pictures.classes import classes_html
 from handey_studio.app.pictures.dial import dial_chips, dial_svg, dial_words, window_of
-from handey_studio.app.pictures.plane import OBSTACLES, PICKUP, grasp_plane_svg, plane_chips, plane_words
+from handey_studio.app.pictures.plane import OBSTACLES, PICKUP, carried_outline, grasp_plane_svg, plane_chips, plane_words
 from handey_studio.app.pictures.table import layout_of, table_html
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, on_user, set_to
-from handey_studio.grasping import Grip
+from handey_studio.grasping import Grip, hand_outline
 from handey_studio.session.handling import fates, way_through
+from handey_studio.session.leading import led_at
 from handey_studio.session.way_out import way_out
 from handey_studio.task.plan import GraspChoice
 
@@ -72,15 +73,20 @@ class GraspPanel:
         if carry is None or state.replay is None:
             set_to(self._plane, content="")
             return
-        at, told = approach_point(state), state.handling
-        number = state.replay.plan.carries.index(carry)
+        plan, part = state.replay.plan, state.session.part(state.replay.plan.part)
+        set_to(self._obstacles, value=state.grasp_look.obstacles)
+        led = led_at(state.replay, state.session.view.time_s)
+        if led is not None and part is not None:
+            picture = grasp_plane_svg(led.run, state.robot.hand, led.at, carry.grasp, part, place=led.place)
+            outline = carried_outline(state.robot.hand, carry.grasp, part, led.place)
+            self._plane.content = html.figure(picture, plane_chips(PICKUP), plane_words(led.run, outline, led.at))
+            return
+        at, told, number = approach_point(state), state.handling, plan.carries.index(carry)
         putdown = told.putdowns[number] if told is not None and number < len(told.putdowns) else None
         which = state.grasp_look.obstacles if putdown is not None else PICKUP
-        set_to(self._obstacles, value=state.grasp_look.obstacles)
-        part = state.session.part(state.replay.plan.part)
-        out = way_out(state.robot, state.replay.plan, carry)
+        out = way_out(state.robot, plan, carry)
         picture = grasp_plane_svg(carry.approach, state.robot.hand, at, carry.grasp, part, putdown, which, out)
-        self._plane.content = html.figure(picture, plane_chips(which), plane_words(carry.approach, state.robot.hand, at))
+        self._plane.content = html.figure(picture, plane_chips(which), plane_words(carry.approach, hand_outline(state.robot.hand), at))
 
     def _render_part(self, state: State) -> None:
         told, look = state.handling, looked_at(state)
@@ -142,7 +148,8 @@ def _grasp_looks(state: State) -> tuple:
 
 
 def _plane_looks(state: State) -> tuple:
-    return id(state.carry), approach_point(state), id(state.handling), state.grasp_look.obstacles
+    led = led_at(state.replay, state.session.view.time_s) if state.replay is not None else None
+    return id(state.carry), approach_point(state), (id(led.run), led.at) if led else None, id(state.handling), state.grasp_look.obstacles
 
 
 def _part_looks(state: State) -> Sequence[object]:

@@ -9,13 +9,16 @@ from handey_studio.app import html, palette
 from handey_studio.app.palette import FILLED, RGB
 from handey_studio.app.pictures.part import part_in_plane
 from handey_studio.app.pictures.svg import PlaneView, arrow, circle, picture_uri, polygon, polyline, svg, words
-from handey_studio.grasping import BumpIterations, BumpOptions, BumpRun, GraspPlane, bump_lines
-from handey_studio.grasping.hand_outline import hand_outline, hand_rectangles
+from handey_studio.base import frozen_array
+from handey_studio.geometry.transforms import inverse
+from handey_studio.grasping import BumpIterations, BumpOptions, BumpRun, GraspPlane, bump_lines, hand_in_plane, hand_outline, outline_with
+from handey_studio.grasping.hand_outline import Outline, hand_rectangles
 from handey_studio.task.plan import GraspChoice
-from handey_studio.world import Hand, Part
+from handey_studio.world import Hand, Held, Part
 
 SIZE = 300
-VIEW_M = 0.30  # how much of the plane is shown, up and across
+VIEW_M = 0.30  # how much of the plane is shown, up and across, or
+ROUND_M = 0.22  # so much round the path if that is more
 DIAL = np.array([256.0, 44.0])  # where the unit circle of Figure 10 stands
 UNIT = 12.0  # pixels of a multiplier of one on it
 LEVER_M = 0.06  # a radian of turn counts as so much way when poses are compared
@@ -29,6 +32,10 @@ FOUND = {
     "plane search": "Bump lines got stuck; a search of all motions in the plane found the way.",
     "straight back": "Straight along the fingers.",
 }
+FOUND_CARRIED = FOUND | {
+    "bump lines": "Bump lines led the hand with the part in it straight back.",
+    "another start": "Bump lines led the hand with the part in it; straight back they got stuck.",
+}
 
 
 def grasp_plane_svg(
@@ -40,24 +47,28 @@ def grasp_plane_svg(
     putdown: GraspPlane | None = None,
     obstacles: str = PICKUP,
     way_out: NDArray | None = None,
+    place: NDArray | None = None,
 ) -> str:
     """Cells filled for the fingers (dark) and the crosspiece (light), the part, the hand at the start and at point `at`, its bump lines
-    at the iteration nearest to that, the path.
+    at the iteration nearest to that, the path. If the hand has the part in it, `place` is the pose (y, z, angle) at which it stands.
 
     World up is up in the picture as far as the plane allows. `putdown` is the grasp plane at the putdown, carried back by the inverse of
     the part's motion: it shares y and z with the pickup's; `way_out` (n, 2) [m] is how the hand leaves there, carried back as well.
     """
-    view = PlaneView(run.plane.T_world_plane, (run.path[-1, :2] + run.path[0, :2]) / 2.0, VIEW_M, SIZE)
+    wide = max(VIEW_M, ROUND_M + float(np.ptp(run.path[:, :2], axis=0).max()))
+    view = PlaneView(run.plane.T_world_plane, (run.path[-1, :2] + run.path[0, :2]) / 2.0, wide, SIZE)
     layers = [] if obstacles == PUTDOWN and putdown is not None else [_cells(view, run.plane, FILLED, palette.PALE)]
     if putdown is not None and obstacles != PICKUP:
         layers.append(_cells(view, putdown, palette.PUTDOWN, PALE_PUTDOWN, 0.75 if layers else 1.0))
+    pose, outline = run.path[at], hand_outline(hand)
     if grasp is not None and part is not None:
-        layers.append(part_in_plane(part, grasp.T_part_plane, view))
+        moved = np.eye(4) if place is None else hand_in_plane(place[:2], place[2], 1) @ inverse(hand_in_plane(pose[:2], pose[2], 1))
+        layers.append(part_in_plane(part, grasp.T_part_plane @ moved, view))
+        outline = outline if place is None else carried_outline(hand, grasp, part, place)
     if way_out is not None and len(way_out):
         layers.append(polyline(view.pixels(way_out), palette.PUTDOWN, 2.5, dash="5 3"))
-    pose = run.path[at]
     layers += [_hand(view, hand, run.path[0], palette.GREY, 0.10), polyline(view.pixels(run.path[:, :2]), palette.BLUE, 2.5)]
-    layers += [_hand(view, hand, pose, palette.TEAL, 0.45), *_iteration(view, run, hand, pose)]
+    layers += [_hand(view, hand, pose, palette.TEAL, 0.45), *_iteration(view, run, outline, pose)]
     layers.append(circle(view.pixels(run.goal[None])[0], 4, palette.VERMILLION))
     return svg("grasp-plane", "Grasp plane", SIZE, SIZE, *layers)
 
@@ -72,10 +83,17 @@ def plane_chips(obstacles: str) -> list[tuple[RGB, str]]:
     return [*shown, *rest, out, (palette.VERMILLION, "bump lines that touch; grasp point")]
 
 
-def plane_words(run: BumpRun, hand: Hand, at: int) -> str:
-    """What it took, and what the bump lines do at this point of the path."""
-    said = FOUND.get(run.found_by, f"Approach: {run.status}, {html.millimetres(run.distance, 1)} from the grasp point.")
-    found = iteration_at(run, hand, run.path[at])
+def carried_outline(hand: Hand, grasp: GraspChoice, part: Part, place: NDArray) -> Outline:
+    """Hand and part together; at the pose `place` (y, z, angle) of the hand the part stands where the plane was laid through it."""
+    T_hand_part = frozen_array(inverse(grasp.T_part_plane @ hand_in_plane(place[:2], place[2], 1)))
+    return outline_with(hand, Held(part.name, part, T_hand_part))[0]
+
+
+def plane_words(run: BumpRun, outline: Outline, at: int) -> str:
+    """What it took, and what the bump lines do at this point of the path; `outline` is what was led, the hand alone or with the part."""
+    found_by = FOUND_CARRIED if run.plane.held.size else FOUND
+    said = found_by.get(run.found_by, f"Approach: {run.status}, {html.millimetres(run.distance, 1)} from the grasp point.")
+    found = iteration_at(run, outline, run.path[at])
     if found is None:
         return said
     told, k = found
@@ -84,12 +102,12 @@ def plane_words(run: BumpRun, hand: Hand, at: int) -> str:
     return f"{said} Iteration {k + 1} of {len(told.poses)}: {lines}; the hand {RULES[int(told.rules[k])]}."
 
 
-def iteration_at(run: BumpRun, hand: Hand, pose: NDArray) -> tuple[BumpIterations, int] | None:
+def iteration_at(run: BumpRun, outline: Outline, pose: NDArray) -> tuple[BumpIterations, int] | None:
     """The iterations of the bump lines' run, and the number of that in which the hand was nearest to a pose (y, z, angle).
 
-    None if the run kept none, or those of a hand with other bump lines.
+    None if the run kept none, or those of something with other bump lines.
     """
-    told, lines = run.iterations, len(bump_lines(hand_outline(hand), BumpOptions()).vectors)
+    told, lines = run.iterations, len(bump_lines(outline, BumpOptions()).vectors)
     k = 0 if told is None else len(told.poses)
     shapes = [] if told is None else [told.poses.shape, told.colliding.shape, told.multipliers.shape, told.free.shape, told.rules.shape]
     if (
@@ -104,8 +122,10 @@ def iteration_at(run: BumpRun, hand: Hand, pose: NDArray) -> tuple[BumpIteration
 
 @lru_cache(maxsize=16)
 def _image(plane: GraspPlane, dark: RGB, light: RGB) -> str:
-    """Both grids as one image with a pixel a cell."""
+    """The grids as one image with a pixel a cell; where only what is held may not go it is as light as where the crosspiece may not."""
     image = np.zeros((*plane.fingers.shape, 4), dtype=np.uint8)
+    if plane.held.size:
+        image[plane.held] = (*light, 255)
     image[plane.crosspiece] = (*light, 255)
     image[plane.fingers] = (*dark, 255)
     return picture_uri(image)
@@ -136,9 +156,9 @@ def _hand(view: PlaneView, hand: Hand, pose: NDArray, colour: RGB, opacity: floa
     return "".join(shapes)
 
 
-def _iteration(view: PlaneView, run: BumpRun, hand: Hand, pose: NDArray) -> list[str]:
+def _iteration(view: PlaneView, run: BumpRun, outline: Outline, pose: NDArray) -> list[str]:
     """Bump lines, near solid and far dashed; bump vectors as long as their multipliers; the free motion vector; the unit circle."""
-    lines, found = bump_lines(hand_outline(hand), BumpOptions()), iteration_at(run, hand, pose)
+    lines, found = bump_lines(outline, BumpOptions()), iteration_at(run, outline, pose)
     at = pose if found is None else found[0].poses[found[1]]
     touching = np.zeros(len(lines.vectors), dtype=bool) if found is None else found[0].colliding[found[1]]
     axes, drawn = _axes(at[2]), []
