@@ -116,9 +116,11 @@ def picking_share(element: str, whole: float) -> str:
     return picking(element, f"({share}*{whole:.6g}).toFixed(3)")
 
 
-def heading(text: str) -> str:
-    """The heading of a section."""
-    return f'<div style="font-weight:650;font-size:12.5px;margin:8px 14px 2px">{esc(text)}</div>'
+def heading(text: str, source: str = "") -> str:
+    """The heading of a section, with what it comes from at the right."""
+    row = "display:flex;justify-content:space-between;align-items:baseline;margin:8px 14px 2px;font-size:12.5px"
+    told = f'<span style="color:var(--muted);font-size:11.5px">{esc(source)}</span>'
+    return f'<div style="{row}"><b style="font-weight:650">{esc(text)}</b>{told}</div>'
 
 
 def pressing(element: str) -> str:
@@ -127,10 +129,14 @@ def pressing(element: str) -> str:
 
 
 def figure(svg: str, chips: Iterable[tuple[palette.RGB, str]], words: str) -> str:
-    """A picture, what its colours mean, and a sentence about it."""
+    """A picture, what its colours mean, and a sentence about it; a double click shows it as large as the screen, and small again."""
     row = "".join(swatch(colour, label) for colour, label in chips)
     legend = f'<div style="margin-top:4px">{row}</div><div>{esc(words)}</div>'
-    return f'<div style="margin:6px 14px;font-size:12px;line-height:1.7">{svg}{legend}</div>'
+    enlarge = "document.fullscreenElement ? document.exitFullscreen() : this.requestFullscreen()"
+    return (
+        f'<div data-figure title="Double click: the whole screen" ondblclick="{enlarge}" '
+        f'style="margin:6px 14px;font-size:12px;line-height:1.7">{svg}{legend}</div>'
+    )
 
 
 def sentence(text: str) -> str:

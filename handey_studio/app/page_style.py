@@ -28,6 +28,8 @@ def _named(page: int) -> str:
 PAGE = (
     f"<style>:root{{{_named(0)}}} :root[data-mantine-color-scheme=dark]{{{_named(1)}}} "
     f":root[data-mantine-color-scheme=dark] [role=tab]{{--mantine-primary-color-filled:{DARK_BRAND};--tabs-color:{DARK_BRAND}}} "
+    "[data-figure]:fullscreen{box-sizing:border-box;padding:2vh 4vw;background:var(--mantine-color-body);font-size:2.2vh !important} "
+    "[data-figure]:fullscreen svg{height:78vh} "
     f".mantine-ScrollArea-content{{padding-right:{GUTTER_PX}px;box-sizing:border-box}}</style>"
 )
 

@@ -32,6 +32,7 @@ class GraspPanel:
 
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         self._grasp = gui.add_html("")
+        self._above = gui.add_html(html.heading("Approach in the grasp plane", "Figures 8 to 10"), visible=False)
         self._obstacles = gui.add_dropdown("Obstacles", OBSTACLES, hint="Figure 8: those of the putdown, carried back by the part's motion")
         self._plane = gui.add_html("")
         self._classes = gui.add_html("")
@@ -54,6 +55,7 @@ class GraspPanel:
 
     def _render_grasp(self, state: State) -> None:
         carry = state.carry
+        set_to(self._above, visible=carry is not None)
         set_to(self._obstacles, visible=carry is not None)
         if carry is None:
             self._grasp.content = html.empty(NO_GRASP, "grasp-empty")
@@ -66,7 +68,9 @@ class GraspPanel:
         which = ""
         if plan is not None and plan.regrasps:
             which = html.card(f"Grasp {plan.carries.index(carry) + 1} of {plan.regrasps + 1}", "The timeline says which one is shown.")
-        self._grasp.content = which + html.facts(grasp_facts(carry.grasp), "grasp") + html.heading("Legal hand angles") + dial
+        self._grasp.content = (
+            which + html.facts(grasp_facts(carry.grasp), "grasp") + html.heading("Legal hand angles", "Figure 7 of 1987") + dial
+        )
 
     def _render_plane(self, state: State) -> None:
         carry = state.carry
@@ -79,7 +83,7 @@ class GraspPanel:
         if led is not None and part is not None:
             picture = grasp_plane_svg(led.run, state.robot.hand, led.at, carry.grasp, part, place=led.place)
             outline = carried_outline(state.robot.hand, carry.grasp, part, led.place)
-            self._plane.content = html.figure(picture, plane_chips(PICKUP), plane_words(led.run, outline, led.at))
+            self._plane.content = html.figure(picture, plane_chips(PICKUP, carried=True), plane_words(led.run, outline, led.at))
             return
         at, told, number = approach_point(state), state.handling, plan.carries.index(carry)
         putdown = told.putdowns[number] if told is not None and number < len(told.putdowns) else None
@@ -102,11 +106,11 @@ class GraspPanel:
         chosen = state.carry.grasp.group if state.carry is not None and result is not None else ""
         entries = fates(result.ledger) if result is not None else {}
         pictures = classes_html(told, entries, chosen, look.grasp_class, element_id(self._class))
-        self._classes.content = hidden + html.heading(f"Grasp classes of {told.part.name}, ranked") + pictures
+        self._classes.content = hidden + html.heading(f"Grasp classes of {told.part.name}, ranked", "Figure 6") + pictures
         way = way_through(told.table, result.plan) if result is not None and result.plan is not None else ()
         layout = layout_of(told, look.grasp_class)
         table = table_html(told, layout, look.row, look.column, way, element_id(self._cell))
-        self._table.content = html.heading("Grasp–placement table") + table
+        self._table.content = html.heading("Grasp–placement table", "Section 5.3") + table
 
 
 def approach_point(state: State) -> int:

@@ -52,7 +52,8 @@ class LedgerPanel:
             self._stage.options = stages
         set_to(self._stage, value=new.ledger_stage if new.ledger_stage in stages else ALL_STAGES)
         buttons, reasons = [element_id(button) for button in self._rows], [element_id(button) for button in self._reasons]
-        set_to(self._browse, visible=bool(entries))
+        for widget in (self._stage, self._only, self._words, self._browse):
+            set_to(widget, visible=bool(entries))
         self._list.content = (
             ledger_html(new, buttons, reasons) if entries else html.hidden((*buttons, *reasons)) + html.empty(NOTHING, "ledger-empty")
         )

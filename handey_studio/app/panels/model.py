@@ -81,7 +81,7 @@ class ModelPanel:
                 mime_type=".png,.json,.npy,.ply,.pcd",
                 hint="PNG with its camera (JSON), NPY, PLY, PCD",
             )
-            self._unit: Any = gui.add_dropdown("Clouds in", ("m", "cm", "mm"))
+            self._unit: Any = gui.add_dropdown("Unit of clouds", ("m", "cm", "mm"), hint="In what unit an uploaded PLY, PCD or NPY is")
         self._import = gui.add_upload_button(
             "Import a mesh",
             icon=viser.Icon.FILE_IMPORT,

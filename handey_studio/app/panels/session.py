@@ -13,7 +13,7 @@ from handey_studio.app.wire import Send, on_click, on_upload, set_to
 
 TAKE_UP, LET_GO = "Take it up", "Discard it"
 LEFT = ("Something was not saved", "The workbench ended before a session was saved; a working copy of it is there.")
-BUTTONS = (("Session", ("New", "Open", "Save", "Save as")), ("More", ("Download", "Guide", "Keys")))
+BUTTONS = (("File", ("New", "Open", "Save", "Save as")), ("More", ("Download", "Guide", "Keys")))
 MODEL_OPEN = "A model is open: Part tells of it, the other panes of the MOVE before."
 
 
