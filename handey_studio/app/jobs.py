@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from handey_studio.app.compared import with_outcome
-from handey_studio.app.state import Job, State, with_view
+from handey_studio.app.state import BUSY, Job, State, with_view
 from handey_studio.base import BadInput
 from handey_studio.session import CommandState, Session
 from handey_studio.session.ledger_tree import ROOT
@@ -14,7 +14,6 @@ from handey_studio.task.plan import MoveResult
 
 KINDS = {"planned": "planned", "done": "good", "failed": "bad"}  # of notices
 FIRST_JOB = "Starting the planner. The first time after an installation its code is compiled: a minute or two, once."
-BUSY = "the planner is at work; cancel first or wait for it."
 CANCELLED = "cancelled"  # the reason that a planner gives when it was told to stop
 
 

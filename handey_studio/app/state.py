@@ -10,7 +10,7 @@ from handey_studio.app.grasp_look import GraspLook
 from handey_studio.app.modelling.look import ModelLook
 from handey_studio.app.outcome import Outcome
 from handey_studio.app.settings import Settings
-from handey_studio.base import Entry
+from handey_studio.base import BadInput, Entry
 from handey_studio.localization import Hypothesis
 from handey_studio.localization.explain import Explanation
 from handey_studio.session import Moment, Replay, Session, Told, attempts_of, replay_of
@@ -24,6 +24,7 @@ from handey_studio.task.sense import Scene
 from handey_studio.world import Library, Robot
 
 MAX_UNDO = 100
+BUSY = "the planner is at work; cancel first or wait for it."
 
 
 @dataclass(frozen=True)
@@ -225,7 +226,10 @@ class State:
         return replace(self.showing(session), undo=(*self.undo, Change(label, before))[-MAX_UNDO:], redo=())
 
     def showing(self, session: Session) -> "State":
-        """With another session, and the robot that it names. Raises BadInput when that is unknown."""
+        """With another session, and the robot that it names. Raises BadInput when that is unknown, or when the cell in which the planner
+        is at work would become another one."""
+        if self.job is not None and _cell_of(session) != _cell_of(self.session):
+            raise BadInput(BUSY)
         same = session.workcell.robot == self.session.workcell.robot
         robot = self.robot if same else self.library.robot(session.workcell.robot)
         return replace(self, session=session, robot=robot, playing=self.playing and same)
@@ -257,6 +261,12 @@ def redone(state: State) -> State:
     change = state.redo[-1]
     back = Change(change.label, Settings.of(state.session))
     return replace(state.showing(change.before.put_into(state.session)), undo=(*state.undo, back), redo=state.redo[:-1])
+
+
+def _cell_of(session: Session) -> tuple:
+    """What the cell is made of: settings that stay as they are while the planner is at work."""
+    workcell = session.workcell
+    return workcell.robot, id(workcell.finder), id(workcell.setup)
 
 
 def with_view(state: State, **changes) -> State:

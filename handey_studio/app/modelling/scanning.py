@@ -8,7 +8,7 @@ from handey_studio.app.jobs import JobStarted
 from handey_studio.app.modelling.look import SELECT, ModelLook, Waiting
 from handey_studio.app.planner import Run
 from handey_studio.app.session_actions import OpenSession
-from handey_studio.app.state import State
+from handey_studio.app.state import BUSY, State
 from handey_studio.base import BadInput
 from handey_studio.modeling.draft import Draft, with_scan
 from handey_studio.modeling.scans import Scan
@@ -19,7 +19,6 @@ from handey_studio.session.modelling import scan_cell, turn_over
 NAME = "part"
 EXAMPLE = "model_a_part"
 MAX_UPLOAD_BYTES = 64_000_000
-BUSY = "the planner is at work; cancel first or wait for it."
 
 
 @dataclass(frozen=True)
