@@ -73,14 +73,17 @@ def grasp_plane_svg(
     return svg("grasp-plane", "Grasp plane", SIZE, SIZE, *layers)
 
 
-def plane_chips(obstacles: str) -> list[tuple[RGB, str]]:
-    """What the colours mean."""
-    pickup = [(FILLED, "fingers may not go here"), (palette.PALE, "nor the crosspiece here")]
+def plane_chips(obstacles: str, carried: bool = False) -> list[tuple[RGB, str]]:
+    """What the colours mean; `carried` if the hand has the part in it."""
+    pickup = [
+        (FILLED, "fingers may not go here"),
+        (palette.PALE, "nor the crosspiece or the part here" if carried else "nor the crosspiece here"),
+    ]
     putdown = [(palette.PUTDOWN, "the same at the putdown"), (PALE_PUTDOWN, "crosspiece there")]
     shown = [*(pickup if obstacles != PUTDOWN else []), *(putdown if obstacles != PICKUP else [])]
     rest = [(palette.TEAL, "hand"), (palette.BLUE, "its path, free motion vector"), (palette.ORANGE, "bump lines, vectors × multiplier")]
-    out = (palette.PUTDOWN, "dashed: its way out at the putdown")
-    return [*shown, *rest, out, (palette.VERMILLION, "bump lines that touch; grasp point")]
+    out = [] if carried else [(palette.PUTDOWN, "dashed: its way out at the putdown")]
+    return [*shown, *rest, *out, (palette.VERMILLION, "bump lines that touch; grasp point")]
 
 
 def carried_outline(hand: Hand, grasp: GraspChoice, part: Part, place: NDArray) -> Outline:
