@@ -38,9 +38,10 @@ class PlanScene:
         if replay is None:
             return
         scene.add_frame("/plan", show_axes=False)
-        points, colours = coloured_path(replay)
+        hand = replay.hand_path(SAMPLES)
+        points, colours = coloured_path(replay, hand)
         self._path = scene.add_line_segments(PATH, scaled(points), colors=colours, thickness=3.0, thickness_units="screen")
-        beads = clearance_beads(replay)
+        beads = clearance_beads(replay, hand)
         if beads is not None:
             self._beads = scene.add_point_cloud(
                 BEADS, scaled(beads[0]), beads[1], point_size=0.03, point_shape="circle", precision="float32"
@@ -53,22 +54,21 @@ class PlanScene:
                 handle.visible = layer not in hidden
 
 
-def coloured_path(replay: Replay) -> tuple[NDArray, NDArray]:
-    """Segments (n, 2, 3) [m] of the fingertips' path and their colours (n, 2, 3)."""
-    points = replay.hand_path(SAMPLES)
-    times = np.linspace(0.0, replay.duration, SAMPLES)
+def coloured_path(replay: Replay, points: NDArray) -> tuple[NDArray, NDArray]:
+    """Segments (n - 1, 2, 3) [m] of the fingertips' path through points (n, 3), evenly in time, and their colours (n - 1, 2, 3)."""
+    times = np.linspace(0.0, replay.duration, len(points))
     kinds = [replay.plan.steps[replay.step_at(t)].kind for t in times[:-1]]
     colours = np.array([palette.STEP_COLOURS[kind] for kind in kinds], dtype=np.uint8)
     return np.stack([points[:-1], points[1:]], axis=1), np.repeat(colours[:, None], 2, axis=1)
 
 
-def clearance_beads(replay: Replay) -> tuple[NDArray, NDArray] | None:
-    """Points (n, 3) [m] along the fingertips' path and their colours (n, 3) by how near anything comes to the arm while it is there."""
-    times = np.linspace(0.0, replay.duration, SAMPLES)
+def clearance_beads(replay: Replay, points: NDArray) -> tuple[NDArray, NDArray] | None:
+    """Points (n, 3) [m] of the fingertips' path, evenly in time, with their colours (n, 3) by how near anything then comes to the arm."""
+    times = np.linspace(0.0, replay.duration, len(points))
     told = [replay.clearance(t) for t in times]
     if None in told:
         return None
-    return replay.hand_path(SAMPLES), palette.clearance_colours(np.array(told, dtype=float) / TOLD_M)
+    return points, palette.clearance_colours(np.array(told, dtype=float) / TOLD_M)
 
 
 def _looks(state: State) -> tuple:
