@@ -101,10 +101,10 @@ def _of_move(old: State | None, new: State) -> tuple[State | None, State]:
 
 def _left(gui: viser.GuiApi, send: Send) -> list[Any]:
     panel = gui.add_panel()
-    with panel.add_tab("Model"):
-        model = ModelPanel(gui, send)
     with panel.add_tab("Move"):
         move = MovePanel(gui, send)
+    with panel.add_tab("Model"):
+        model = ModelPanel(gui, send)
     with panel.add_tab("View"):
         looking = LookingPanel(gui, send)
     with panel.add_tab("Edges"):

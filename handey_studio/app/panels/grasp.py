@@ -130,7 +130,7 @@ def grasp_facts(grasp: GraspChoice) -> list[tuple[str, str]]:
         ("Grasp class", grasp.name),
         ("Approach group", grasp.group.removeprefix(f"{grasp.name}, ")),
         ("Legal angles", ranges or "none"),
-        ("Chosen angle", f"{np.rad2deg(grasp.angle - zero) + 0.0:.1f}°"),
+        ("Chosen angle", f"{round(float(np.rad2deg(grasp.angle - zero)), 1) + 0.0:.1f}°"),
         ("Tilt", f"{np.rad2deg(grasp.tilts[0]):.0f}° at pickup, {np.rad2deg(grasp.tilts[1]):.0f}° at putdown"),
         ("Fingers", f"{html.millimetres(grasp.width, 1)} held, {html.millimetres(grasp.opening)} open"),
         ("Contact", f"{1e6 * grasp.contact_area:.0f} mm² each"),

@@ -57,6 +57,7 @@ def legend(state: State) -> str:
         (palette.BLUE, "destination"),
         (palette.TEAL, "grasp"),
         (palette.SKY, "hypothesis"),
+        (palette.VERMILLION, "collision"),
     )
     row = "".join(html.swatch(colour, label) for colour, label in chips)
     return f'<div data-testid="legend" style="margin:4px 14px;font-size:12px;line-height:1.7">{bar}{row}</div>'
