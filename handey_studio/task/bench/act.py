@@ -213,18 +213,20 @@ def sentence(summary: dict[str, Any]) -> str:
 
 
 def summarise_faults(rows: list[dict[str, Any]]) -> dict[str, dict[str, int]]:
-    """For each kind: how many changed anything (the MOVE did not just come out right), were noticed, put right, or called done wrongly."""
-    summary = {}
-    for kind in dict.fromkeys(row["fault"] for row in rows):
-        mine = [row for row in rows if row["fault"] == kind]
-        mattered = [row for row in mine if row["noticed"] or not row["right"]]
-        recoverable = [row for row in mattered if row["recoverable"]]
-        summary[kind] = {
-            "moves": len(mine),
-            "mattered": len(mattered),
-            "noticed": sum(row["noticed"] for row in mattered),
-            "recoverable": len(recoverable),
-            "recovered": sum(row["status"] == "done" and row["right"] for row in recoverable),
-            "wrong_done": sum(row["wrong_done"] for row in mine),
-        }
-    return summary
+    """For each kind, and for all: how many changed anything (the MOVE did not just come out right), were noticed, put right, or called
+    done wrongly."""
+    kinds = dict.fromkeys(row["fault"] for row in rows)
+    return {kind: _counts([row for row in rows if row["fault"] == kind]) for kind in kinds} | {"all": _counts(rows)}
+
+
+def _counts(rows: list[dict[str, Any]]) -> dict[str, int]:
+    mattered = [row for row in rows if row["noticed"] or not row["right"]]
+    recoverable = [row for row in mattered if row["recoverable"]]
+    return {
+        "moves": len(rows),
+        "mattered": len(mattered),
+        "noticed": sum(row["noticed"] for row in mattered),
+        "recoverable": len(recoverable),
+        "recovered": sum(row["status"] == "done" and row["right"] for row in recoverable),
+        "wrong_done": sum(row["wrong_done"] for row in rows),
+    }
