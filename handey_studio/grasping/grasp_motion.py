@@ -65,7 +65,7 @@ def plan_grasp_motion(
     space = plane_space(plane, outline, np.array([*group.point, angle]), options.search)
     path, allowed, cost = None, _allowed(space, hand, group, ranges), _upright(plane, space, options)
     for angles in ([a for a in allowed if a == space.root[2]], allowed):
-        sources = [found for a in angles for found in _source(plane, outline, space, a, -_along(a), options.search.out)]
+        sources = [found for a in angles for found in _sources(plane, outline, space, a, options)]
         path = _ways(plane, outline, space, sources, cost, options) if path is None else path
     if path is None:
         return replace(nearest, status="no way") if nearest.status != "short contact" else nearest
@@ -92,8 +92,8 @@ def plan_retreat(plane: GraspPlane, hand: Hand, pose: NDArray, options: MotionOp
     if nearest.status == "reached":
         return replace(nearest, path=shortened(plane, outline, nearest.path, options.search.margin))
     space = plane_space(plane, outline, pose, options.search)
-    source = _source(plane, outline, space, pose[2], -_along(pose[2]), options.search.out)
-    path = _ways(plane, outline, space, source, _upright(plane, space, options), options)
+    sources = _sources(plane, outline, space, pose[2], options)
+    path = _ways(plane, outline, space, sources, _upright(plane, space, options), options)
     if path is None:
         return replace(nearest, status="no way")
     return replace(nearest, path=path, goal=path[-1, :2], status="reached", distance=0.0, found_by="plane search")
@@ -166,6 +166,13 @@ class _Source(NamedTuple):
     pose: NDArray
     backed: NDArray
     node: NDArray
+
+
+def _sources(plane: GraspPlane, outline: Outline, space: PlaneSpace, angle: float, options: MotionOptions) -> list[_Source]:
+    """From the root's point with the hand at an angle: straight back along the fingers, straight up, and between."""
+    back, up = -_along(angle), plane.T_world_plane[2, 1:3]
+    directions = [d / np.linalg.norm(d) for d in (back, back + up, up) if np.linalg.norm(d) > 0.2]
+    return [found for d in directions for found in _source(plane, outline, space, angle, d, options.search.out)]
 
 
 def _source(

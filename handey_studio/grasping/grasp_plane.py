@@ -1,8 +1,9 @@
 """The grasp plane and its filled cells (Handey 1987 §5.2, Figure 9).
 
-The grasp plane lies parallel to the grasped faces and midway between them. The hand sweeps one grasp volume for each finger and
-one for the crosspiece (its mount on the arm moves in the crosspiece's). From every depth point a ray goes down; that portion of it that
-lies within a volume is projected onto the plane and fills the cells that it crosses. Known solids fill the cells that they reach.
+The grasp plane lies parallel to the grasped faces and midway between them. The hand sweeps one grasp volume for each finger, one for
+the crosspiece, and one, which the paper has not, for its mount on the arm, which is narrower. From every depth point a ray goes down;
+that portion of it that lies within a volume is projected onto the plane and fills the cells that it crosses. Known solids fill the cells
+that they reach.
 
 The fingers' two volumes are clipped one by one and share a grid: they move as one and have the same outline in the plane. A part in the
 hand sweeps a volume of its own, as thick as the part.
@@ -31,7 +32,7 @@ NO_CELLS = np.zeros((0, 0), dtype=bool)
 
 
 class Filled(NamedTuple):
-    """Filled cells (v, n, n) of the volumes in their order: the fingers', the crosspiece's, and what is held's if there is one."""
+    """Filled cells (v, n, n) of the volumes in their order: fingers, crosspiece, mount, and what is held if there is something."""
 
     volumes: NDArray
     origin: NDArray
@@ -42,8 +43,8 @@ class Filled(NamedTuple):
 class GraspPlane(Value):
     """Filled cells of a grasp plane. `T_world_plane`: x along the closing direction, y and z in the plane.
 
-    `fingers`, `crosspiece` and, if something is held, `held` (n, n) bool: cell (i, k) covers y from origin[0] + i·cell and z from
-    origin[1] + k·cell.
+    `fingers`, `crosspiece`, `mount` and, if something is held, `held` (n, n) bool: cell (i, k) covers y from origin[0] + i·cell and z from
+    origin[1] + k·cell. In planes of earlier versions the mount moves in the crosspiece's volume.
     """
 
     T_world_plane: NDArray
@@ -52,17 +53,19 @@ class GraspPlane(Value):
     fingers: NDArray
     crosspiece: NDArray
     held: NDArray = field(default_factory=lambda: NO_CELLS)
+    mount: NDArray = field(default_factory=lambda: NO_CELLS)
 
     def __post_init__(self) -> None:
         for key in ("T_world_plane", "origin"):
             object.__setattr__(self, key, frozen_array(getattr(self, key)))
-        for key in ("fingers", "crosspiece", "held"):
+        for key in ("fingers", "crosspiece", "held", "mount"):
             object.__setattr__(self, key, frozen_array(getattr(self, key), bool))
 
     @cached_property
     def filled(self) -> Filled:
         """The same for the compiled functions."""
-        volumes = np.stack([self.fingers, self.crosspiece, *([self.held] if self.held.size else [])])
+        mount = self.mount if self.mount.size else self.crosspiece
+        volumes = np.stack([self.fingers, self.crosspiece, mount, *([self.held] if self.held.size else [])])
         return Filled(volumes, self.origin.copy(), self.cell)
 
     def is_filled(self, volume: str, points: NDArray) -> NDArray:
@@ -84,6 +87,7 @@ def fill_grasp_plane(
     volumes = [
         [(-half - hand.finger_thickness, -half), (half, half + hand.finger_thickness)],
         [(-hand.crosspiece_length / 2.0, hand.crosspiece_length / 2.0)],
+        [(-hand.mount_radius, hand.mount_radius)],
         *([[held]] if held else []),
     ]
     T_plane_world = inverse(T_world_plane)
@@ -95,7 +99,8 @@ def fill_grasp_plane(
         for low, high in slabs:
             _fill_bodies(grid, corners, first, origin, CELL_M, low, high)
             _fill_rays(grid, points.copy(), T_plane_world, world.table_z, origin, CELL_M, low, high)
-    return GraspPlane(T_world_plane, origin, CELL_M, *grids)
+    fingers, crosspiece, mount, *carried = grids
+    return GraspPlane(T_world_plane, origin, CELL_M, fingers, crosspiece, carried[0] if carried else NO_CELLS, mount)
 
 
 def half_size(hand: Hand, way: float = WAY_IN_M) -> float:

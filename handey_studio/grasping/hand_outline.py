@@ -11,7 +11,7 @@ from handey_studio.geometry.transforms import apply
 from handey_studio.grasping.grasp_plane import Filled, GraspPlane
 from handey_studio.world import Hand, Held
 
-VOLUMES = ("fingers", "crosspiece", "held")
+VOLUMES = ("fingers", "crosspiece", "mount", "held")
 SPACING = 0.7  # of a cell, between points that are looked up: no cell slips through between them
 STRIP_M = 0.004  # what is held is cut across into strips of this width
 
@@ -32,7 +32,7 @@ def hand_rectangles(hand: Hand) -> list[tuple[str, float, float, float]]:
         ("crosspiece", hand.crosspiece_width / 2.0, back, -hand.finger_length),
     ]
     mount = -float(hand.T_flange_hand[2, 3])
-    return [*rectangles, ("crosspiece", hand.mount_radius, mount, back)] if mount < back else rectangles
+    return [*rectangles, ("mount", hand.mount_radius, mount, back)] if mount < back else rectangles
 
 
 def hand_outline(hand: Hand) -> Outline:

@@ -17,7 +17,7 @@ def under_roofs(plane: GraspPlane) -> GraspPlane:
     if np.abs(up).max() < LEAST_UP:
         return plane
     down = -up / np.abs(up).max()
-    grids = {key: np.array(getattr(plane, key)) for key in ("fingers", "crosspiece", "held")}
+    grids = {key: np.array(getattr(plane, key)) for key in ("fingers", "crosspiece", "mount", "held")}
     for grid in grids.values():
         _fill_below(grid, grid.copy(), float(down[0]), float(down[1]))
     return replace(plane, **grids)

@@ -33,6 +33,8 @@ TURN_COST = 0.3  # a radian of the joint that turns most counts as so many radia
 USUAL_TURN_RAD = 2.5  # which is what it turns by as long as nobody knows better
 REGRASP_S = 2.0  # each time that the part is put down on the way
 DETOUR_COST = 1.0  # [rad] each further place to put it down is worth that much less
+SAME_ANGLE_RAD = np.deg2rad(2.0)  # a hand that ends so near to the angle that was asked for is at it
+EXACT_COST = 0.3  # [rad] what it is worth to end where bump lines lead
 LED_COST = 0.5  # [rad] what it is worth to lift the part straight up and put it straight down
 ALIKE_RAD = 0.35  # configurations that differ by less than this in every joint are neighbours
 NEIGHBOUR_S = 1.0  # for each neighbour whose arm motion was not found
@@ -192,23 +194,28 @@ class OptionSearch:
                 self._push(node._replace(what=tighter, cost=node.cost + tighter.cost - option.cost))
         for angle in angles:
             cost = node.cost - option.cost + rank_terms(option.group, option.pickup, option.putdown, rotations, angle).cost
-            self._push(Node(APPROACH, node.route, (option, rotations, angle), cost, entry))
+            self._push(Node(APPROACH, node.route, (option, rotations, angle, False), cost, entry))
 
     def _approach(self, node: Node) -> None:
-        option, rotations, angle = node.what
-        entry = self.ledger.add("approach", f"hand at {np.rad2deg(angle - option.group.angle):+.0f}°", parent=node.entry)
-        for grasp in grasps_at(option, rotations, self._way_in(option, rotations, angle), self._plane(option, 1), entry, self.ledger):
+        """The way in to one hand angle; where bump lines end at another, the way in that ends at just this one is another option."""
+        option, rotations, angle, exact = node.what
+        told = f"hand at {np.rad2deg(angle - option.group.angle):+.0f}°{', no other' if exact else ''}"
+        entry = self.ledger.add("approach", told, parent=node.entry)
+        way = self._way_in(option, rotations, angle, exact)
+        if not exact and abs(way.final[2] - angle) > SAME_ANGLE_RAD:
+            self._push(node._replace(what=(option, rotations, angle, True), cost=node.cost + EXACT_COST))
+        for grasp in grasps_at(option, rotations, way, self._plane(option, 1), entry, self.ledger):
             T_part_hand, symmetries = inverse(grasp.choice.T_hand_part), option.goal.instance.part.symmetries
             if self._falls(grasp.entry, grasp_ruled_out(T_part_hand, symmetries, self.options.ruled_out)):
                 continue
             self._push(Node(REACH, node.route, grasp, node.cost, grasp.entry))
 
-    def _way_in(self, option: Option, rotations: LegalRotations, angle: float) -> Approach:
+    def _way_in(self, option: Option, rotations: LegalRotations, angle: float, exact: bool) -> Approach:
         """The approach at the pickup, which is the same wherever the part goes."""
-        key = (*_pickup_of(option), angle)
+        key = (*_pickup_of(option), angle, exact)
         if key not in self._approaches:
-            legal = np.array(rotations.ranges("pickup")).reshape(-1, 2)
-            self._approaches[key] = approach_at(option, self._plane(option, 0), angle, legal)
+            legal = [(angle - SAME_ANGLE_RAD, angle + SAME_ANGLE_RAD)] if exact else rotations.ranges("pickup")
+            self._approaches[key] = approach_at(option, self._plane(option, 0), angle, np.array(legal).reshape(-1, 2))
         return self._approaches[key]
 
     def _plane(self, option: Option, end: int) -> GraspPlane:

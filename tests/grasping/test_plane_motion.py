@@ -26,7 +26,7 @@ from handey_studio.grasping import (
     plane_space,
 )
 from handey_studio.grasping.grasp_plane import CELL_M, half_size
-from handey_studio.grasping.hand_outline import overlaps
+from handey_studio.grasping.hand_outline import VOLUMES, overlaps
 from handey_studio.grasping.plane_search import BIN_M, beyond, way_out
 from handey_studio.world import Block, Held, Library, PlacedPart, World
 from handey_studio.world.collision import collision_model
@@ -281,7 +281,7 @@ def test_strips_cover_what_is_held(seed):
     assert (local[:, 0] >= low - 1e-9).all() and (local[:, 0] <= high + 1e-9).all()
     along = np.array([np.cos(group.angle), np.sin(group.angle)])
     a, b = (local[:, 1:] - group.point) @ np.array([-along[1], along[0]]), (local[:, 1:] - group.point) @ along
-    strips = outline.bounds[outline.volumes == 2]
+    strips = outline.bounds[outline.volumes == VOLUMES.index("held")]
     beyond = np.maximum.reduce([strips[:, 0] - a[:, None], a[:, None] - strips[:, 1], strips[:, 2] - b[:, None], b[:, None] - strips[:, 3]])
     assert (beyond.min(axis=1) <= 1e-9).all()
 
@@ -302,7 +302,9 @@ def test_no_intrusion_of_a_solid_is_missed(seed):
     local = local[(np.abs(local[:, 1:]) < HALF_SIZE_M).all(axis=1)]
     beside = (np.abs(local[:, 0]) >= 0.025) & (np.abs(local[:, 0]) <= 0.025 + HAND.finger_thickness)
     assert plane.is_filled("fingers", local[beside][:, 1:]).all()
-    assert plane.is_filled("crosspiece", local[np.abs(local[:, 0]) <= HAND.crosspiece_length / 2][:, 1:]).all()
+    for volume, half in (("crosspiece", HAND.crosspiece_length / 2), ("mount", HAND.mount_radius)):
+        assert plane.is_filled(volume, local[np.abs(local[:, 0]) <= half][:, 1:]).all()
+    assert not (plane.mount & ~plane.crosspiece).any(), "the mount is narrower than the crosspiece"
 
 
 def cluttered(seed):
