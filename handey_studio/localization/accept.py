@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from handey_studio.localization.candidates import Candidate
-from handey_studio.localization.joint import SAME_READINGS, Rivals, explain_jointly, probabilities, rivals_among
+from handey_studio.localization.joint import SAME_READINGS, WITHIN, Rivals, explain_jointly, probabilities, rivals_among
 from handey_studio.localization.result import Hypothesis, LocatedPose, Rival, pose_matrix
 from handey_studio.localization.search import Search
 
 MOST_RIVALS = 60  # candidates that are weighed against one another
 RIVAL_FROM, TOLD_FROM = 0.01, 0.05  # how probable a pose must be alone to count as a rival, and beside the others to be told as one
 SURE = 1.0 - 1e-9  # no view makes a pose more probable than this
-OUTDONE = "another pose explains its readings better"
+OUTDONE = "another pose explains the view better"
 
 
 class Fall(NamedTuple):
@@ -37,9 +37,9 @@ class Weighing:
     rivals: Rivals
     probability: list[float]
 
-    def against(self, n: int) -> list[int]:
-        """The candidates that claim the same readings as number n, the most probable first."""
-        pairs = [(self.numbers[a], self.numbers[b]) for (a, b), rivalry in self.rivals.items() if rivalry.reason == SAME_READINGS]
+    def against(self, n: int, reasons: tuple[str, ...] = (SAME_READINGS,)) -> list[int]:
+        """The candidates that cannot stand beside number n for one of some `reasons`, the most probable first."""
+        pairs = [(self.numbers[a], self.numbers[b]) for (a, b), rivalry in self.rivals.items() if rivalry.reason in reasons]
         others = [b if a == n else a for a, b in pairs if n in (a, b)]
         return sorted(others, key=lambda k: -self.probability[k])
 
@@ -91,7 +91,7 @@ def _improbable(search: Search, weighing: Weighing, n: int) -> Fall:
     """Why candidate n is too improbable: because of its rivals, or by itself."""
     candidate, p, limit = weighing.candidates[n], weighing.probability[n], search.options.min_score
     if candidate.score.probability >= limit:
-        return Fall(OUTDONE, p, limit, to=weighing.against(n)[0])
+        return Fall(OUTDONE, p, limit, to=weighing.against(n, (SAME_READINGS, WITHIN))[0])
     return Fall(f"improbable, above all as {candidate.score.doubt}", p, limit)
 
 

@@ -108,6 +108,21 @@ def _facing(u, v, d, normals, camera):
     return 1.0 if np.isnan(cosine) else abs(cosine)
 
 
+@njit(cache=True, error_model="numpy")
+def _level(depth, slope, camera, noise, v, level):
+    """Tells of the pixels of row v those, nearly all, that no neighbour falls away from, without a jump even if seen squarely."""
+    height, width = depth.shape
+    level[:] = False
+    if v == 0 or v == height - 1:
+        return
+    above, row, below, slopes = depth[v - 1], depth[v], depth[v + 1], slope[v]
+    for u in range(1, width - 1):
+        d, gu, gv = row[u], slopes[u, 0], slopes[u, 1]
+        least = WEAK * JUMP_SIGMAS * reading_sigma(d, camera, noise)
+        across = (row[u + 1] - d - gu <= least) & (row[u - 1] - d + gu <= least)
+        level[u] = across & (below[u] - d - gv <= least) & (above[u] - d + gv <= least)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _jumps(depth, slope, normals, camera, noise, per_px, rows, strength, outward):
     """How far the depth falls away beside each pixel of some rows, beyond its slope, in sigmas, into `strength` (H, W), and the directions
@@ -117,10 +132,12 @@ def _jumps(depth, slope, normals, camera, noise, per_px, rows, strength, outward
     is wider than MAX_GAP_PX counts as a jump that just stands out.
     """
     height, width = depth.shape
+    level = np.zeros(width, dtype=np.bool_)
     for v in range(rows[0], rows[1]):
+        _level(depth, slope, camera, noise, v, level)
         for u in range(width):
             d = depth[v, u]
-            if np.isnan(d):
+            if level[u] or np.isnan(d):
                 continue
             gu, gv = slope[v, u, 0], slope[v, u, 1]
             if np.isnan(gu):

@@ -1,7 +1,7 @@
 """Explain the view jointly: how probable each pose is beside its rivals, and which can stand together and explain most.
 
-Two poses are rivals when they claim the same readings, pass through one another, or are one pose of one part. Of those that claim
-the same readings at most one is right, perhaps none: their odds share the probability. Choosing the greatest total worth among poses
+Two poses are rivals when they claim the same readings, pass through one another, or are one pose of one part. Of rivals at most one is
+right, perhaps none: their odds share the probability. Choosing the greatest total worth among poses
 without rivals is a weighted independent set; its connected groups are small, and are solved exactly.
 """
 
@@ -14,6 +14,7 @@ from scipy.sparse import csr_array
 
 from handey_studio.localization.candidates import Candidate
 from handey_studio.localization.distinct import displacement
+from handey_studio.localization.marginals import marginals
 from handey_studio.localization.overlap import overlap_depth
 from handey_studio.localization.render import claimed_pixels
 from handey_studio.localization.result import pose_matrix
@@ -70,15 +71,14 @@ def claims_shared(search: Search, candidates: Sequence[Candidate]) -> NDArray:
 
 
 def probabilities(odds: NDArray, rivals: Rivals) -> NDArray:
-    """(n,) how probable each candidate is, given the logarithm (n,) of its odds against nothing that is known standing there: of those that
-    claim the same readings at most one is right."""
-    worth = np.exp(np.clip(odds, -40.0, 40.0))
-    total = 1.0 + worth
+    """(n,) how probable each candidate's pose is, given the logarithm (n,) of its odds against nothing that is known standing there: of
+    all ways in which candidates can stand together the share, by what they are worth, in which it or the same pose stands."""
+    excluded, same = [0] * len(odds), np.eye(len(odds))
     for (a, b), rivalry in rivals.items():
-        if rivalry.reason == SAME_READINGS:
-            total[a] += worth[b]
-            total[b] += worth[a]
-    return worth / total
+        excluded[a] |= 1 << b
+        excluded[b] |= 1 << a
+        same[a, b] = same[b, a] = rivalry.reason == SAME_POSE
+    return np.minimum(same @ marginals(odds, excluded), 1.0)
 
 
 def explain_jointly(worth: Sequence[float], rivals: Rivals) -> Explanation:

@@ -35,6 +35,7 @@ FEATURES = (
     "too little of its surface is seen",  # logarithm of square diameters
     "much of it is hidden",  # root of the share of the faces that look at the sensor
     "it would stand below the table",  # what noise and outlines leave uncertain
+    "too little room is left below it",  # diameters from the table to its lowest corner: what carries it must fit there
     "it touches the table nowhere",  # 1 if a corner does, to within what noise and looseness leave uncertain
     "no three corners touch the table",
     "it does not rest on the table",  # 1 if three corners do, to within noise
@@ -45,6 +46,7 @@ AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.853  # edges times readings that agree
 EDGES_WORTH, EVEN_EDGES = 4.0, 6.0  # more edges that are found say more
 OFF_COST, SUNK_COST = 4.0, 2.0  # a sigma that the readings' rms is too large; a slack too far below the table
 TAIL = 0.003  # of the readings on a right pose's faces seem to see through it all the same: a sensor's noise has tails
+ROOM = 0.4  # diameters below a part, beyond which more says no more
 TOUCHES = 2.0  # standard deviations of a corner's height, and of a reading, from the table
 
 
@@ -95,7 +97,7 @@ class Rated(NamedTuple):
 
 def features(search: Search, part: Part, rated: Rated) -> NDArray:
     """(n, k) the numbers that the score weighs, in the order of `FEATURES`: what is not known is what is typical of right poses."""
-    found = np.concatenate([_of_edges(search, part, rated), _of_readings(part, rated), _of_footing(search, rated)], axis=1)
+    found = np.concatenate([_of_edges(search, part, rated), _of_readings(part, rated), _of_footing(search, part, rated)], axis=1)
     return np.where(np.isnan(found), FITTED.typical, found)
 
 
@@ -133,13 +135,14 @@ def _of_readings(part: Part, rated: Rated) -> NDArray:
     )
 
 
-def _of_footing(search: Search, rated: Rated) -> NDArray:
+def _of_footing(search: Search, part: Part, rated: Rated) -> NDArray:
     height, view = rated.footing[:, [0, 2]], search.view
     uncertain = TOUCHES * (view.noise + np.minimum(rated.sigma, search.slack))[:, None]
     below = np.clip(-height[:, :1] / search.slack, 0.0, 4.0)
     touches = np.where(np.isnan(height), np.nan, height < uncertain)
     rests = np.where(np.isnan(height[:, 1:]), np.nan, np.abs(height[:, 1:]) < TOUCHES * view.noise + 0.25 * view.outline_error)
-    return np.concatenate([below, touches, rests], axis=1)
+    room = np.clip(height[:, :1] / part.solid.diameter, 0.0, ROOM)
+    return np.concatenate([below, room, touches, rests], axis=1)
 
 
 class Score(NamedTuple):

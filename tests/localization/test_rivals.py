@@ -9,7 +9,8 @@ from handey_studio.geometry import box
 from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.localization import LocateOptions, localize
 from handey_studio.localization.accept import OUTDONE
-from handey_studio.localization.joint import SAME_POSE, SAME_READINGS, WITHIN, Rivalry, explain_jointly
+from handey_studio.localization.joint import SAME_POSE, SAME_READINGS, WITHIN, Rivalry, explain_jointly, probabilities
+from handey_studio.localization.marginals import marginals
 from handey_studio.localization.report import locate_report
 from handey_studio.world import Part
 from tests.localization.rendering import map_from_above
@@ -73,3 +74,39 @@ def test_the_best_that_can_stand_together_is_found(worth, data):
     assert set(found.fell) == set(range(n)) - set(found.chosen)
     for k, (better, rivalry) in found.fell.items():
         assert better in found.chosen and rivals[min(k, better), max(k, better)] == rivalry
+
+
+@given(st.lists(st.floats(-30.0, 30.0), min_size=1, max_size=8), st.data())
+@settings(max_examples=100, deadline=None)
+def test_each_hypothesis_is_as_probable_as_the_sets_that_hold_it(odds, data):
+    """Against adding up every subset that can stand together."""
+    n = len(odds)
+    pairs = {(a, b) for a, b in data.draw(st.sets(st.tuples(st.integers(0, n - 1), st.integers(0, n - 1)))) if a != b}
+    excluded = [sum(1 << k for k in range(n) if (k, m) in pairs or (m, k) in pairs) for m in range(n)]
+    subsets = [[k for k in range(n) if bits >> k & 1] for bits in range(2**n)]
+    subsets = [s for s in subsets if not any(a in s and b in s for a, b in pairs)]
+    worth = np.exp([sum(odds[k] for k in s) for s in subsets])
+    expected = [sum(w for w, s in zip(worth, subsets, strict=True) if k in s) / worth.sum() for k in range(n)]
+    assert marginals(np.array(odds), excluded) == pytest.approx(expected, rel=1e-9)
+
+
+def test_many_sure_hypotheses_that_exclude_one_another_share_the_probability():
+    all_others = [((1 << 60) - 1) & ~(1 << k) for k in range(60)]
+    assert marginals(np.full(60, 40.0), all_others) == pytest.approx(np.full(60, 1.0 / 60.0))
+
+
+def test_what_passes_through_a_sure_pose_leaves_its_readings_to_its_rival():
+    """Two poses that explain the same readings, of which one would pass through a third that is beyond doubt."""
+    odds, alike = np.array([2.0, 2.0, 12.0]), Rivalry(SAME_READINGS, 1.0, 0.3, "")
+    even = probabilities(odds, {(0, 1): alike})
+    assert even[0] == pytest.approx(even[1])
+    settled = probabilities(odds, {(0, 1): alike, (1, 2): Rivalry(WITHIN, 0.02, 0.005, "m")})
+    assert settled[0] > 0.85 and settled[1] < 0.01 and settled[2] > 0.99
+
+
+def test_the_same_pose_found_twice_is_one():
+    same, alike = Rivalry(SAME_POSE, 0.001, 0.01, "m"), Rivalry(SAME_READINGS, 1.0, 0.3, "")
+    once, twice = np.array([3.0, 1.0]), np.array([3.0 - np.log(2.0), 3.0 - np.log(2.0), 1.0])
+    expected = probabilities(once, {(0, 1): alike})
+    found = probabilities(twice, {(0, 1): same, (0, 2): alike, (1, 2): alike})
+    assert found == pytest.approx([expected[0], expected[0], expected[1]])

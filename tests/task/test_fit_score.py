@@ -94,19 +94,16 @@ def test_hidden_weights_are_found_among_rivals(seed, units):
     assert p.reshape(-1, 4).sum(axis=1).max() < 1.0 and p[right].mean() > p[~right].mean()
 
 
-@given(st.lists(st.floats(-60.0, 60.0), min_size=1, max_size=7), st.data())
+@given(st.lists(st.tuples(st.floats(-30.0, 30.0), st.integers(0, 2)), min_size=1, max_size=7), st.sampled_from([SAME_READINGS, WITHIN]))
 @settings(max_examples=50, deadline=None)
-def test_rivals_share_the_probability(odds, data):
-    """The localizer's shares, the fit's and those of a slow sum; what merely stands in another's way takes none."""
-    pairs = [(a, b) for b in range(len(odds)) for a in range(b)]
-    kinds = {pair: data.draw(st.sampled_from([None, SAME_READINGS, WITHIN])) for pair in pairs}
-    rivals = {pair: Rivalry(kind, 0.5, MAX_CLAIMED, "") for pair, kind in kinds.items() if kind}
-    p, worth = probabilities(np.array(odds), rivals), np.exp(np.clip(odds, -40.0, 40.0))
+def test_rivals_share_the_probability(told, reason):
+    """The localizer's shares, the fit's and those of a slow sum, where each one of a group excludes all others of it."""
+    odds, group = np.array([one for one, _ in told]), np.array([number for _, number in told])
+    pairs = [(a, b) for b in range(len(odds)) for a in range(b) if group[a] == group[b]]
+    p, worth = probabilities(odds, {pair: Rivalry(reason, 0.5, MAX_CLAIMED, "") for pair in pairs}), np.exp(odds)
     for n in range(len(odds)):
-        beside = [k for k in range(len(odds)) if kinds.get((min(n, k), max(n, k))) == SAME_READINGS]
-        assert p[n] == pytest.approx(worth[n] / (1.0 + worth[n] + worth[beside].sum()))
-    same = [pair for pair, kind in kinds.items() if kind == SAME_READINGS]
-    np.testing.assert_allclose(conditional(np.array(odds), np.array(same, dtype=int).reshape(-1, 2)), p)
+        assert p[n] == pytest.approx(worth[n] / (1.0 + worth[group == group[n]].sum()))
+    np.testing.assert_allclose(conditional(odds, np.array(pairs, dtype=int).reshape(-1, 2)), p)
 
 
 def test_what_makes_right_poses_come_first_is_found():
