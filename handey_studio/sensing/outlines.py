@@ -1,7 +1,8 @@
 """How far a depth image's silhouettes may lie off sideways, measured from the image itself.
 
 Depth cameras match patches of a pattern, so at a jump of depth they lose readings or give them to the wrong side, now more, now less:
-the outline of a straight edge wanders. A sensor that reads each pixel for itself, or a rendering, keeps it straight to the pixel.
+the outline of a straight edge wanders. A sensor that reads each pixel for itself, or a rendering, keeps it straight to the pixel, but
+for readings that it loses by chance: these differ from line to line, where a wandering outline changes little.
 The contours of jumps are followed over a few pixels each and held against straight lines; most contours of things are straight for so
 long. What also counts is the band without readings beside a jump, in the direction where it is narrowest: shadows make it wide in others.
 """
@@ -18,9 +19,9 @@ MAX_GAP_PX = 25  # wider bands without readings are no mark of the outline
 MAX_TURN_PX = 6  # from line to line
 MAX_SLANT = 1.2  # px a line; flatter contours are followed in the other direction
 MIN_CONTOURS = 6
-STRAIGHT_SHARE = 0.4  # this quantile of the contours' wandering: a part of them has corners
+STRAIGHT_SHARE = 0.4  # this quantile of the contours: a part of them has corners
 ROUNDING = 1.0 / 12.0  # px²: what whole pixels alone make of a straight line
-BIAS = 4.0  # an outline that wanders by this standard deviation lies off by so many times as much
+BIAS = 4.6  # an outline whose lines wander together by this standard deviation lies off by so many times as much
 JUMP_SIGMAS, JUMP_PX = 8.0, 5.0  # a jump is that many times the noise or the pixel
 STEEPEST_PX = 3.0  # depth falls by no more pixels' sizes a pixel on a surface that is seen at all
 UNKNOWN_PX = 2.0
@@ -39,10 +40,10 @@ def measured_outline_error(depth: NDArray, projection: Pinhole | Orthographic, n
     jump = max(JUMP_SIGMAS * noise, JUMP_PX * pixel)
     sideways = np.ascontiguousarray(depth.T)
     contours = [_contours(image, _bands(len(image)), way, jump, STEEPEST_PX * pixel) for image in (depth, sideways) for way in (1, -1)]
-    wander = np.concatenate([found[:, 0] for found in contours])
-    if len(wander) < MIN_CONTOURS:
+    off = np.concatenate([found[:, 0] for found in contours])
+    if len(off) < MIN_CONTOURS:
         return min(UNKNOWN_PX * pixel, MOST_M)
-    off_px = BIAS * float(np.quantile(wander, STRAIGHT_SHARE))
+    off_px = float(np.quantile(off, STRAIGHT_SHARE))
     lost_px = min(0.5 * (float(np.median(found[:, 1])) - 1.0) for found in contours if len(found))
     return float(np.clip(max(off_px, lost_px) * pixel, pixel, max(pixel, MOST_M)))
 
@@ -55,7 +56,7 @@ def _bands(lines: int) -> NDArray:
 
 @njit(cache=True)
 def _contours(depth: NDArray, tops: NDArray, way: int, jump: float, per_px: float) -> NDArray:
-    """Wandering [px] and width of the jump [px] (n, 2) of each contour that crosses a band from its first line to its last.
+    """How far off it lies [px] and how wide its jump is [px] (n, 2), of each contour that crosses a band from its first line to its last.
 
     `way` 1 looks along the lines for jumps to farther readings, −1 against them.
     """
@@ -70,9 +71,9 @@ def _contours(depth: NDArray, tops: NDArray, way: int, jump: float, per_px: floa
         for line in range(WINDOW_PX):
             count[line] = _jumps_of(depth[top + line], way, jump, per_px, place[line], gap[line])
         for k in range(count[0]):
-            wander, lost = _follow(place, gap, count, k)
-            if wander >= 0.0:
-                out[n, 0], out[n, 1] = wander, lost
+            off, lost = _follow(place, gap, count, k)
+            if off >= 0.0:
+                out[n, 0], out[n, 1] = off, lost
                 n += 1
     return out[:n]
 
@@ -102,7 +103,8 @@ def _jumps_of(line: NDArray, way: int, jump: float, per_px: float, place: NDArra
 
 @njit(cache=True)
 def _follow(place: NDArray, gap: NDArray, count: NDArray, k: int) -> tuple[float, float]:
-    """How far the contour from the first line's k-th jump wanders about a straight line [px rms], −1 if it ends; its mean gap [px]."""
+    """How far off [px] the contour from the first line's k-th jump lies, by how it wanders about a straight line, −1 if it ends; its mean
+    gap [px]. What is not alike in neighbouring lines is chance, and lies no farther off than it wanders."""
     n = len(count)
     at, total = place[0, k], 0.0
     places = np.empty(n)
@@ -121,4 +123,7 @@ def _follow(place: NDArray, gap: NDArray, count: NDArray, k: int) -> tuple[float
     if abs(slant) > MAX_SLANT:
         return -1.0, 0.0
     off = places - places.mean() - slant * t
-    return np.sqrt(max(0.0, (off * off).sum() / (n - 2) - ROUNDING) / (1.0 + slant * slant)), total / n
+    variance, steps = (off * off).sum() / (n - 2), off[1:] - off[:-1]
+    chance = min(max(0.5 * (steps * steps).mean(), ROUNDING), variance)
+    lies_off = BIAS * BIAS * (variance - chance) + max(chance - ROUNDING, 0.0)
+    return np.sqrt(lies_off / (1.0 + slant * slant)), total / n

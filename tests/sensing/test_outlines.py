@@ -50,6 +50,17 @@ def test_a_ragged_outline_lies_off_by_more_than_it_wanders(seed):
     assert 1.45 * pixel < measured_outline_error(ragged, KINECT, 0.001) < 5.0 * pixel
 
 
+@pytest.mark.parametrize("lost", [0.1, 0.3, 0.6])
+@pytest.mark.parametrize("above", [False, True])
+def test_readings_lost_by_chance_at_rims_are_no_wandering_outline(lost, above):
+    depth, rng = scene(3, above), np.random.default_rng(3)
+    beside = np.asarray(ndimage.maximum_filter(depth, 3)) - depth > 0.01
+    depth[beside & (rng.random(depth.shape) < lost)] = np.nan
+    pixel = 0.001 if above else np.nanmedian(depth) / 525.0
+    error = measured_outline_error(depth + rng.normal(0.0, 0.0005, depth.shape), ABOVE if above else KINECT, 0.0005)
+    assert pixel <= error < 1.4 * pixel
+
+
 def test_readings_lost_on_all_sides_count_by_half_their_band():
     depth = scene(1, above=True)
     steps = np.asarray(ndimage.maximum_filter(depth, 3)) - depth > 0.01
