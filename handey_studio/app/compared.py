@@ -6,6 +6,7 @@ import numpy as np
 
 from handey_studio.app.outcome import Outcome
 from handey_studio.app.state import State
+from handey_studio.app.wording import arrow_words
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.session import Session
 from handey_studio.task.plan import MoveResult
@@ -33,7 +34,7 @@ def outcome_of(state: State, result: MoveResult) -> Outcome:
     check = result.performance.check if result.performance is not None else None
     seen = None if check is None or check.off_m is None or check.off_rad is None else (check.off_m, check.off_rad)
     noticed = sum(len(performance.incidents) for performance in result.performances)
-    said = f"{result.command.part} → {result.command.to}"
+    said = arrow_words(result.command)
     off = truly_off(state.session, result) if result.status == "done" else None
     return Outcome(is_misplaced(state), said, result.status, result.reason, len(result.performances), noticed, seen, off)
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from handey_studio.app.compared import with_outcome
 from handey_studio.app.state import BUSY, Job, State, with_view
+from handey_studio.app.wording import move_words
 from handey_studio.base import BadInput
 from handey_studio.session import CommandState, Session
 from handey_studio.session.ledger_tree import ROOT
@@ -131,7 +132,7 @@ def _beside(shown: Session, found: Session) -> tuple[tuple[MoveResult, ...], tup
 
 def outcome(result: MoveResult) -> str:
     """One sentence about a result."""
-    what = f"MOVE {result.command.part} TO {result.command.to}"
+    what = move_words(result.command)
     if result.reason == CANCELLED:
         return f"{what} was cancelled."
     if result.status == "failed":

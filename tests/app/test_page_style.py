@@ -1,4 +1,4 @@
-"""The page's own style."""
+"""The page's own style, and how it words numbers."""
 
 import re
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 from handey_studio import app
 from handey_studio.app import palette
 from handey_studio.app.page_style import GREYS
+from handey_studio.app.wording import destination_words
 
 
 def luminance(colour: str) -> float:
@@ -34,3 +35,10 @@ def test_words_can_be_read_on_both_pages():
     for colour in palette.STEP_COLOURS.values():
         words = palette.words_on(colour).replace("#fff", "#ffffff")
         assert contrast(words, palette.css(colour)) >= 3.5
+
+
+def test_destinations_are_told_in_millimetres_and_degrees():
+    assert destination_words("0.35,-0.08,0") == "350, -80, 0 mm"
+    assert destination_words("0.23,0.19,-0.0,90,0,-0.0") == "230, 190, 0 mm, turned 90°, 0°, 0°"
+    assert destination_words("in:0.3,0.25,0.6,0.45") == "x 300 to 600, y 250 to 450 mm"
+    assert destination_words("on:l_block:block") == "on:l_block:block"

@@ -11,6 +11,7 @@ from handey_studio.app.page_style import in_a_row
 from handey_studio.app.sequence import AddCommand, ChooseCommand, RemoveCommand, RunCommands, ShiftCommand, SkipCommand, StartOver
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, element_id, on_click, set_to
+from handey_studio.app.wording import arrow_words
 from handey_studio.session.sequence import next_command, states_of
 from handey_studio.session.session import CommandState
 
@@ -91,7 +92,7 @@ def _row(state: State, number: int, told: CommandState, button: str) -> str:
         if told.status == "failed"
         else ""
     )
-    words = html.esc(f"{command.part} → {command.to}")
+    words = html.esc(arrow_words(command))
     return (
         f'<div data-testid="command-{number}" data-status="{told.status}" role="button" tabindex="0" title="{words}: {told.status}" '
         f'onclick="{html.esc(html.pressing(button))}" style="cursor:pointer;{look};padding:2px 8px">'

@@ -10,6 +10,7 @@ from handey_studio.app.guidance import UNSEEN, unseen
 from handey_studio.app.panels.running import HappenedPanel
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click, set_to
+from handey_studio.app.wording import move_words
 from handey_studio.geometry.transforms import pose_difference
 from handey_studio.task.carrying import TOLD_M
 from handey_studio.task.plan import MovePlan, MoveResult
@@ -79,7 +80,7 @@ def clearance_legend() -> str:
 def result_html(result: MoveResult) -> str:
     """Status, reason, poses, certificate."""
     tone = {"planned": "info", "done": "good", "failed": "bad"}[result.status]
-    title = f"MOVE {result.command.part} TO {result.command.to}"
+    title = move_words(result.command)
     done = UNSEEN if unseen(result) else "Done."
     said = {"planned": "Planned, not carried out yet.", "done": done}.get(result.status, html.sentence(result.reason))
     pane = html.card(title, said, tone, "result")
