@@ -136,9 +136,9 @@ def test_the_way_back_begins_at_rest_wherever_on_a_step_the_arm_was_stopped(reco
 class Endless(Troubled):
     """Its transfer ends only when the cell is told to stop."""
 
-    def __init__(self) -> None:
+    def __init__(self, broken_off: bool = False) -> None:
         super().__init__()
-        self.halt = threading.Event()
+        self.halt, self.broken_off = threading.Event(), broken_off
 
     def stop(self) -> None:
         self.halt.set()
@@ -147,6 +147,8 @@ class Endless(Troubled):
         done = super().follow(motion)
         if self.carried != 2:
             return done
+        if self.broken_off:
+            raise KeyboardInterrupt
         return Moved("stopped", done.recording) if self.halt.wait(20.0) else done
 
 
@@ -171,3 +173,10 @@ def test_a_cancel_stops_the_arm_in_the_middle_of_a_motion():
     assert cell.halt.is_set() and (result.status, result.reason) == ("failed", "cancelled")
     assert result.performance is not None and result.performance.performed[-1].what == "transfer"
     assert cell.held_truly() == "brick", "what is held is not let go of, and nothing else is begun"
+
+
+def test_an_interrupted_program_leaves_no_arm_moving():
+    cell = Endless(broken_off=True)
+    with pytest.raises(KeyboardInterrupt):
+        run_move(station(), cell, COMMAND, MoveOptions(seed=1))
+    assert cell.halt.is_set()
