@@ -4,6 +4,7 @@ A gap that was seen stays one: two parts in line are two edges, and so is an edg
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from handey_studio.localization.edges import JUMP
@@ -11,6 +12,7 @@ from handey_studio.localization.flanks import Seen
 from handey_studio.localization.lines import Line
 from handey_studio.localization.pieces import fitted
 from handey_studio.sensing.depth_view import DepthView
+from handey_studio.sensing.drawing import Camera, project
 
 SIGMAS = 3.0  # by which two pieces of one line may lie off one another
 UNSURE_ANGLE, MOST_ANGLE = np.deg2rad(0.5), np.deg2rad(8.0)  # adds to the sigma of an angle; the widest that is one direction
@@ -39,7 +41,7 @@ def over_dropouts(
         jump = bool(kinds[i] == JUMP)
         if a == b or not _same_owner(lines[i], lines[j]) or not _goes_on(view, seen, lines[i], lines[j], jump):
             continue
-        members = np.nonzero((segment >= 0) & np.isin(number[segment], (a, b)))[0]
+        members = np.nonzero((segment >= 0) & ((number[segment] == a) | (number[segment] == b)))[0]
         (line,) = fitted(seen, outward, kind, u, v, members, np.array([0, len(members)]))
         if line.pixels >= KEPT * (merged[a].pixels + merged[b].pixels):
             merged[a] = line
@@ -91,22 +93,25 @@ def _goes_on(view: DepthView, seen: Seen, a: Line, b: Line, jump: bool) -> bool:
     pixel = 1.0 / float(np.mean(view.projection.pixels_per_metre(float(gap[0, 2]))))
     slack = SIGMAS * view.noise + pixel
     if not jump:
-        behind = _behind(view, gap)
+        behind = _behind(seen.depth, seen.camera, gap)
         return bool(np.isnan(behind).mean() >= UNREAD_OF_ALL) and _seldom(np.abs(behind) > slack, MARGIN_PX + seen.radius)
     lost = view.outline_error + 2.0 * pixel
-    inside, outside = (_behind(view, gap + side * a.inward[0]) for side in (pixel, -lost))
+    inside, outside = (_behind(seen.depth, seen.camera, gap + side * a.inward[0]) for side in (pixel, -lost))
     return _seldom(np.abs(inside) > slack, MARGIN_PX) and _seldom(outside < slack, MARGIN_PX)
 
 
-def _behind(view: DepthView, ends: NDArray) -> NDArray:
+@njit(cache=True)
+def _behind(depth: NDArray, camera: Camera, ends: NDArray) -> NDArray:
     """How far [m] readings lie behind a line (2, 3), at the places along it: NaN where nothing was read."""
-    ends_uv = view.projection.project(ends)
-    steps = max(2, int(np.ceil(np.abs(ends_uv[1] - ends_uv[0]).max())) + 1)
-    u, v = np.rint(np.linspace(ends_uv[0], ends_uv[1], steps)).astype(int).T
-    height, width = view.depth.shape
-    within = (u >= 0) & (v >= 0) & (u < width) & (v < height)
-    depth = np.asarray(view.depth)[np.where(within, v, 0), np.where(within, u, 0)]
-    return np.where(within, depth, np.nan) - np.linspace(ends[0, 2], ends[1, 2], steps)
+    start, end = project(ends[0, 0], ends[0, 1], ends[0, 2], camera), project(ends[1, 0], ends[1, 1], ends[1, 2], camera)
+    steps = max(2, int(np.ceil(max(abs(end[0] - start[0]), abs(end[1] - start[1])))) + 1)
+    behind = np.full(steps, np.nan)
+    for k in range(steps):
+        share = k / (steps - 1)
+        u, v = np.rint(start[0] + share * (end[0] - start[0])), np.rint(start[1] + share * (end[1] - start[1]))
+        if u >= 0 and v >= 0 and u < depth.shape[1] and v < depth.shape[0]:
+            behind[k] = depth[int(v), int(u)] - ends[0, 2] - share * (ends[1, 2] - ends[0, 2])
+    return behind
 
 
 def _seldom(off: NDArray, margin: int) -> bool:
