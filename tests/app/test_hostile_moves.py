@@ -107,7 +107,7 @@ def check_sound(studio: Studio) -> None:
 
 
 @settings(
-    max_examples=60, deadline=None, phases=(Phase.explicit, Phase.generate), suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=40, deadline=None, phases=(Phase.explicit, Phase.generate), suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(seed=st.integers(0, 10**6))
 def test_hostile_hands_while_moves_run_get_sentences_and_lose_nothing(folder, seed):
