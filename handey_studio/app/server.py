@@ -17,7 +17,7 @@ from handey_studio.app.wire import close_share_tunnel
 from handey_studio.app.workbench import Workbench
 from handey_studio.base import BadInput
 from handey_studio.motion import warm_up
-from handey_studio.session import Session, find_session, read_session
+from handey_studio.session import Session, find_session, looking, read_session
 from handey_studio.session.run import run_session
 from handey_studio.world import Library
 
@@ -54,6 +54,7 @@ def start(
     if left is not None:
         workbench.send(Offer(left))
     workbench.start()
+    threading.Thread(target=looking.warm_up, name="warm-up", daemon=True).start()
     return workbench
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.base import Entry, frozen_array
+from handey_studio.geometry import box
 from handey_studio.geometry.transforms import apply, inverse
 from handey_studio.localization import DataEdge, Hypothesis, LocateOptions
 from handey_studio.localization.explain import Explanation, explain
@@ -17,7 +18,7 @@ from handey_studio.localization.search import Search, look
 from handey_studio.sensing.depth_map import DepthMap
 from handey_studio.sensing.solid import solid_columns, without_parts
 from handey_studio.task.sense import Scene
-from handey_studio.world import Part
+from handey_studio.world import Part, PlacedPart
 
 CLICK_RAD = 0.008  # about nine pixels in a window of ordinary height
 SAMPLES = 24
@@ -29,6 +30,12 @@ def unexplained(scene: Scene) -> NDArray:
     """Cells (ny, nx) bool whose reading no located part explains: these stay when the parts are drawn as solids."""
     columns = solid_columns(scene.depth_map)
     return frozen_array(without_parts(scene.depth_map, columns, scene.instances).top >= columns.top, bool)
+
+
+def warm_up() -> None:
+    """Loads, or compiles, what `unexplained` uses, so that the first look at a scan does not wait for it: a box on a small map."""
+    scan = DepthMap(np.zeros((8, 8)), 0.001, np.eye(4), np.zeros((8, 8)))
+    without_parts(scan, solid_columns(scan), (PlacedPart("box", Part("box", box((0.004, 0.004, 0.004))), np.eye(4)),))
 
 
 def cells_of(scan: DepthMap, points_world: NDArray) -> NDArray:
