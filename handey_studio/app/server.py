@@ -18,6 +18,7 @@ from handey_studio.app.workbench import Workbench
 from handey_studio.base import BadInput
 from handey_studio.motion import warm_up
 from handey_studio.session import Session, find_session, looking, read_session
+from handey_studio.session.ahead import compile_beside, rehearse
 from handey_studio.session.run import run_session
 from handey_studio.world import Library
 
@@ -59,7 +60,8 @@ def start(
 
 
 def serve(workbench: Workbench, open_browser: bool) -> None:
-    """Stay until interrupted."""
+    """Stay until interrupted. On a machine where all is new, what a MOVE needs is compiled meanwhile."""
+    compile_beside(rehearse, workbench.state.session, workbench.state.library)
     if open_browser:
         webbrowser.open(f"http://{workbench.server.get_host()}:{workbench.server.get_port()}")
     try:

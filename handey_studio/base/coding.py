@@ -113,7 +113,7 @@ def _as_array(kind: Any, value: Any) -> np.ndarray:
         raise BadInput(f"an array was expected, not {type(value).__name__}.")
     try:
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise BadInput("a list of numbers, all rows of one length, was expected as an array.") from None
     array.flags.writeable = False
     return array

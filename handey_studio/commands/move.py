@@ -1,6 +1,7 @@
 """`handey move`: run a session's MOVEs."""
 
 import argparse
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 NAME = "move"
 HELP = "run a session's MOVEs: sense, plan, execute"
+FIRST = "The first run on a machine compiles its numerical code: a minute or two, once."
 
 
 def add_arguments(move: argparse.ArgumentParser) -> None:
@@ -73,7 +75,9 @@ class Watching(Lines):
 
 def opened(given: argparse.Namespace) -> "tuple[Session, Library]":
     """The session that is asked for, with the commands, robot and seed that are given."""
+    from handey_studio.motion import warm_up
     from handey_studio.session import find_session, read_session
+    from handey_studio.session.ahead import compile_beside
     from handey_studio.world import Library
 
     for output in (given.json, given.save):
@@ -84,7 +88,10 @@ def opened(given: argparse.Namespace) -> "tuple[Session, Library]":
         session = replace(session, workcell=replace(session.workcell, robot=given.robot))
     seed = session.seed if given.seed is None else given.seed
     improve = session.improve if given.improve is None else given.improve
-    return replace(session, commands=_commands(given, session), seed=seed, improve=improve), library
+    session = replace(session, commands=_commands(given, session), seed=seed, improve=improve)
+    if compile_beside(warm_up, library.robot(session.workcell.robot)) and sys.stderr.isatty():
+        print(FIRST, file=sys.stderr)
+    return session, library
 
 
 def write_outputs(given: argparse.Namespace, session: "Session", library: "Library", results: "Sequence[MoveResult]") -> None:

@@ -107,6 +107,8 @@ def _check_solid(path: str, solid: Polyhedron) -> None:
     corners = {corner for face in solid.faces for loop in face.loops for corner in loop}
     if solid.vertices.ndim != 2 or solid.vertices.shape[1:] != (3,) or not corners <= set(range(len(solid.vertices))):
         raise BadInput(f"{path} has faces with corners that it lacks.")
+    if not (far := float(np.abs(solid.vertices).max(initial=0.0))) <= MAX_COORDINATE_M:
+        raise BadInput(f"{path} has a corner {far:.3g} m away, the limit is {MAX_COORDINATE_M:.0f} m.")
     if any(len(loop) < 3 for face in solid.faces for loop in face.loops):
         raise BadInput(f"{path} has a face with fewer than 3 corners.")
     try:
