@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handey_studio.app.browsing import browsed_hypotheses, edges_shown, page_of, wired
+from handey_studio.app.ruler import laid
 from handey_studio.app.state import State, with_view
 from handey_studio.session.looking import edge_at, hypotheses_at
 
@@ -122,7 +123,7 @@ class Select:
 
 @dataclass(frozen=True, eq=False)
 class PointAt:
-    """A click into the scene along a ray: it looks at the hypothesis or else the data edge there, if one is shown there.
+    """A click into the scene along a ray: it looks at the hypothesis or else the data edge there, if one is shown there, or lays the ruler.
 
     Where several hypotheses have their wires, each further click looks at the next of them.
     """
@@ -132,6 +133,8 @@ class PointAt:
 
     def apply(self, state: State) -> State:
         session = state.session
+        if state.ruler is not None and not state.modelling:
+            return laid(state, self.origin, self.direction)
         if session.scene is None or state.modelling:
             return state
         there = hypotheses_at(session.scene, session.parts, wired(state), self.origin, self.direction)

@@ -11,6 +11,7 @@ from handey_studio.app.modelling.accepting import Accept, Escape
 from handey_studio.app.modelling.steps import RemovePicked
 from handey_studio.app.panels.session import SessionPanel
 from handey_studio.app.playback import SeekStep, TogglePlay
+from handey_studio.app.ruler import ToggleRuler
 from handey_studio.app.session_actions import SaveSession
 from handey_studio.app.viewpoints import Follow, LookFrom
 from handey_studio.app.wire import Send, on_trigger
@@ -26,6 +27,7 @@ KEYS: tuple[tuple[str, Any, Any, Any], ...] = (
     ("To the end", "end", None, SeekStep(99)),
     ("Plan", "P", None, StartMove(execute=False)),
     ("MOVE", "M", None, StartMove(execute=True)),
+    ("Take up the ruler, or put it away", "R", None, ToggleRuler()),
     ("Look at no hypothesis", "0", None, LookAt(-1)),
     ("Cancel planning, or put the modeller's tool down", "escape", None, Escape()),
     ("Take what the modeller offers, or finish its tool", "enter", None, Accept()),

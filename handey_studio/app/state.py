@@ -6,6 +6,8 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from handey_studio.app.grasp_look import GraspLook
 from handey_studio.app.modelling.look import ModelLook
 from handey_studio.app.outcome import Outcome
@@ -85,7 +87,8 @@ class State:
     `chosen` is the place in the list of the command that is set up, -1 for the last. `calibration` is
     one that was neither accepted nor discarded yet, `outcomes` are the MOVEs carried out since the session was opened. `left_behind` is a
     working copy of an earlier run that waits for a word of the user's,
-    `taken_up` whether this session is one. `dark`: whether the page is.
+    `taken_up` whether this session is one. `dark`: whether the page is. `ruler`: the spots (3,) [m] that the
+    ruler was laid to, None while it is put away.
     """
 
     library: Library
@@ -101,6 +104,7 @@ class State:
     speed: float = 1.0
     loop: bool = False
     dark: bool = False
+    ruler: tuple[NDArray, ...] | None = None
     notices: tuple[Notice, ...] = ()
     viewers: int = 0
     ledger_stage: str = ""

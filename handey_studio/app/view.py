@@ -36,6 +36,7 @@ from handey_studio.app.scene.pair import PairScene
 from handey_studio.app.scene.parts import PartsScene
 from handey_studio.app.scene.pile import PileScene
 from handey_studio.app.scene.robot import PlannedArmScene, RobotScene
+from handey_studio.app.scene.ruler import RulerScene
 from handey_studio.app.scene.sensing import SensingScene
 from handey_studio.app.scene.workcell import WorkcellScene
 from handey_studio.app.scene.wrist_box import WristBoxScene
@@ -63,7 +64,7 @@ class View:
         scenes += [DepthScene(server), PartsScene(server, send)]
         scenes += [PileScene(server), DestinationScene(server, send), SensingScene(server, send), HypothesisScene(server)]
         scenes += [PairScene(server), PlanScene(server), GraspScene(server), StandingScene(server)]
-        scenes += [CSpaceScene(server), WristBoxScene(server), FailureScene(server)]
+        scenes += [CSpaceScene(server), WristBoxScene(server), FailureScene(server), RulerScene(server)]
         server.gui.add_html(PAGE)
         session = SessionPanel(server, send)
         self._scenes: list[Pane] = scenes

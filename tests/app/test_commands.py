@@ -14,11 +14,12 @@ from handey_studio.app.jobs import JobDone, JobFailed, JobProgress, JobShows, Jo
 from handey_studio.app.ledger_commands import FilterLedger, LedgerPage, LedgerReason, LedgerRow, LedgerUp, LookAtNoEntry
 from handey_studio.app.looking_at import PointAt, Select, ShowLayer
 from handey_studio.app.playback import Seek, SeekStep, SetPlayback, Tick, TogglePlay
+from handey_studio.app.ruler import HOW, ClickPart, ToggleRuler, ruler_words
 from handey_studio.app.setting_up import ChoosePart, ChooseRobot, DropGhost, FreePose, ResetCell, SetDestination, SetSeed
 from handey_studio.app.settings import Settings
 from handey_studio.app.state import MAX_UNDO, opened
 from handey_studio.base import BadInput, Ledger, rejected_counts
-from handey_studio.geometry.transforms import from_xyz_rpy, to_xyz_rpy
+from handey_studio.geometry.transforms import apply, from_xyz_rpy, to_xyz_rpy
 from handey_studio.session.destination import destination_pose, snapped
 from handey_studio.session.ledger_tree import ROOT
 from tests.session.samples import fresh_session, full_session, library
@@ -174,6 +175,20 @@ def test_a_click_on_an_edge_looks_at_it(full):
     assert PointAt(origin, beside - origin).apply(full) is full
     hidden = ShowLayer("data edges", False).apply(full)
     assert PointAt(origin, middle - origin).apply(hidden) is hidden
+
+
+def test_the_ruler_takes_clicks_to_itself_until_it_is_put_away(full):
+    def click(spot):
+        return PointAt(spot + np.array([0.1, -0.2, 0.5]), np.array([-0.1, 0.2, -0.5]))
+
+    corner = apply(full.session.located[0].T_world_part, full.session.located[0].part.solid.vertices)
+    corner = corner[np.argmax(corner @ [0.1, -0.2, 0.5])]  # the one nearest to where the clicks come from
+    state = after(full, ToggleRuler(), click(corner + 0.001), click(np.array([0.9, 0.9, 0.0])), ClickPart("nothing of that name"))
+    assert state.ruler is not None and state.session is full.session
+    assert np.allclose(state.ruler, [corner, [0.9, 0.9, full.session.workcell.table_z]], atol=1e-9)
+    assert f"{1e3 * np.linalg.norm(state.ruler[1] - state.ruler[0]):.1f} mm apart" in ruler_words(state.ruler)
+    assert len(after(state, click(corner)).ruler) == 1 and after(state, ToggleRuler()).ruler is None
+    assert ruler_words(()) == HOW
 
 
 def test_hiding_and_showing_a_layer(full):

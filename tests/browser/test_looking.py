@@ -36,6 +36,22 @@ def test_hypotheses_are_looked_at_by_row_key_and_wire(studio, visit, tmp_path):
     wait_until(lambda: "1 of 2 jump" in pane(page, "edges").inner_text())
     page.keyboard.press("0")
     wait_until(lambda: workbench.state.hypothesis is None and not workbench.state.undo)
+    _measure(page, workbench)
+
+
+def _measure(page, workbench) -> None:
+    """The ruler laid between two spots in the middle of the view."""
+    middle = workbench.state.session.view.camera_look_at
+    page.get_by_role("tab", name="View").click()
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("r")
+    wait_until(lambda: workbench.state.ruler == ())
+    for count, along in enumerate((0.0, 0.02), 1):
+        page.mouse.click(*pixel_of(page, workbench, 10.0 * (middle + np.array([along, 0.0, 0.0]))))
+        wait_until(lambda count=count: len(workbench.state.ruler) == count)
+    pane(page, "ruler").get_by_text("mm apart").wait_for()
+    page.keyboard.press("Escape")
+    wait_until(lambda: workbench.state.ruler is None)
 
 
 def _click_a_wire(page, workbench, number: int) -> None:

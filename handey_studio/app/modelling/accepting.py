@@ -34,7 +34,8 @@ class Accept:
 
 @dataclass(frozen=True)
 class Escape:
-    """A job is stopped; else the scan in which the model was looked for goes; else the tool is put down; else nothing is selected."""
+    """A job is stopped; else the ruler is put away, or the scan in which the model was looked for; else the tool is put down; else nothing
+    is selected."""
 
     def run(self, bench: Bench) -> State:
         state = bench.state
@@ -43,7 +44,7 @@ class Escape:
         if state.model.mesh is not None:
             return LeaveMesh().apply(state)
         if not state.model.open:
-            return state
+            return replace(state, ruler=None)
         if state.model.trial is not None:
             return replace(state, model=replace(state.model, trial=None))
         if state.model.clicks or state.model.drawing is not None:

@@ -17,6 +17,7 @@ KEYS = (
     ("6, 0", "look at the hypothesis from close up, at none"),
     ("N, B", "the next hypothesis, the one before"),
     ("7", "look at the configuration space"),
+    ("R", "the ruler: click two spots in the scene"),
     ("Enter, Delete", "take what the modeller offers; remove its step"),
     ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo"),
     ("Ctrl+S, Ctrl+O", "save, open"),

@@ -5,6 +5,7 @@ import viser
 from handey_studio.app import html, palette
 from handey_studio.app.looking_at import SetDark, ShowLayer
 from handey_studio.app.palette import ELEVATION, ELEVATION_AT
+from handey_studio.app.ruler import ToggleRuler, ruler_words
 from handey_studio.app.scene.depth import elevation_span
 from handey_studio.app.state import State
 from handey_studio.app.viewpoints import LookFrom
@@ -20,6 +21,9 @@ class LookingPanel:
     def __init__(self, gui: viser.GuiApi, send: Send) -> None:
         for label, views in VIEWS:
             on_click(gui.add_button_group(label, views), send, lambda event: LookFrom(event.target.value, event.client_id))
+        self._ruler = gui.add_button("Ruler", icon=viser.Icon.RULER_MEASURE, color="gray", hint="How far are two spots apart? (R)")
+        on_click(self._ruler, send, lambda _: ToggleRuler())
+        self._measured = gui.add_html("", visible=False)
         self._legend = gui.add_html("")
         self._dark = gui.add_checkbox("Dark page", False, hint="For everyone who looks at this workbench")
         on_user(self._dark, send, lambda event: SetDark(bool(event.target.value)))
@@ -32,6 +36,10 @@ class LookingPanel:
 
     def render(self, old: State | None, new: State) -> None:
         set_to(self._dark, value=new.dark)
+        if old is None or old.ruler is not new.ruler:
+            set_to(self._ruler, label="Ruler" if new.ruler is None else "Put the ruler away")
+            told = html.card("Ruler", ruler_words(new.ruler), "info", "ruler") if new.ruler is not None else ""
+            set_to(self._measured, content=told, visible=bool(told))
         hidden = new.session.view.hidden_layers
         if old is None or old.session.view.hidden_layers != hidden:
             for layer, box in self._layers.items():

@@ -5,8 +5,8 @@ import viser
 from numpy.typing import NDArray
 
 from handey_studio.app import palette
+from handey_studio.app.ruler import ClickPart
 from handey_studio.app.scene.units import place, scaled
-from handey_studio.app.setting_up import ChoosePart
 from handey_studio.app.state import State
 from handey_studio.app.wire import Send, on_click
 from handey_studio.world import Part
@@ -57,7 +57,7 @@ class PartsScene:
             name = f"{ROOT}/{number}"
             self._frames[placed.name], faces = add_solid(scene, name, placed.part, palette.ORANGE, placed.T_world_part)
             self._faces[placed.name] = faces
-            on_click(faces, self._send, lambda _, chosen=placed.name: ChoosePart(chosen))
+            on_click(faces, self._send, lambda _, chosen=placed.name: ClickPart(chosen))
             top = placed.part.solid.vertices.mean(axis=0)
             self._labels[placed.name] = scene.add_label(f"{name}/label", placed.name, position=scaled(top), font_screen_scale=0.75)
 
