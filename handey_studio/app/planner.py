@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from handey_studio.base import BadInput
+from handey_studio.base.processes import start_apart
 from handey_studio.session import Session
 from handey_studio.world import Library
 
@@ -99,7 +100,7 @@ class Planner:
         self._cancel = self._context.Event()
         given = (theirs, self._cancel, self._run, self._prepare)
         self._process = self._context.Process(target=_serve, args=given, name="handey-planner", daemon=True)
-        self._process.start()
+        start_apart(self._process)
         theirs.close()
         threading.Thread(target=self._listen, args=(self._pipe, self._process), name="planner-listener", daemon=True).start()
 
@@ -151,12 +152,10 @@ def _serve(pipe: Connection, cancel: Any, run: Run, prepare: Callable[[], None] 
     while True:
         try:
             order = pipe.recv()
-        except (EOFError, KeyboardInterrupt):
+        except EOFError:
             return
         progress = PipeProgress(order.number, pipe, cancel)
         try:
             pipe.send(Finished(order.number, (order.run or run)(order.session, order.library, order.execute, progress)))
         except BadInput as error:
             pipe.send(Failed(order.number, str(error)))
-        except KeyboardInterrupt:
-            return

@@ -5,13 +5,13 @@ Compiled code is kept on the disk, so each of the two loads what the other has c
 
 import multiprocessing as mp
 import os
-import signal
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 from handey_studio.base import BadInput, Silent
 from handey_studio.base.compiled import is_compiled
+from handey_studio.base.processes import start_apart
 from handey_studio.localization.creases import crease
 from handey_studio.motion.marching import march
 from handey_studio.session.run import run_session
@@ -30,7 +30,7 @@ def compile_beside(work: Callable[..., Any], *given: Any) -> bool:
     """Starts a process that does `work(*given)` for what it compiles, and ends with this one; False where nothing is left to compile."""
     if is_compiled(crease) and is_compiled(march):
         return False
-    mp.get_context("spawn").Process(target=_quietly, args=(work, given), name="handey-compiling", daemon=True).start()
+    start_apart(mp.get_context("spawn").Process(target=_quietly, args=(work, given), name="handey-compiling", daemon=True))
     return True
 
 
@@ -42,7 +42,6 @@ def rehearse(session: Session, library: Library) -> None:
 
 def _quietly(work: Callable[..., Any], given: tuple[Any, ...]) -> None:
     """What is wrong with the session is told by the process that works."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICE)
     with suppress(BadInput):
         work(*given)
