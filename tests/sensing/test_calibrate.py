@@ -10,8 +10,9 @@ from handey_studio.base import BadInput
 from handey_studio.geometry.transforms import apply, inverse, pose_difference, transform
 from handey_studio.sensing.stripes.board import Board, fit_camera, place_boards
 from handey_studio.sensing.stripes.board_stripes import on_board
-from handey_studio.sensing.stripes.calibrate import CalibrateOptions, laser_plane, one_step, range_frame
+from handey_studio.sensing.stripes.calibrate import laser_plane
 from handey_studio.sensing.stripes.laser_planes import distances, plane_through
+from handey_studio.sensing.stripes.rig_frames import one_step, range_frame
 from handey_studio.sensing.stripes.stripe_camera import StripeCamera
 
 CAMERA = StripeCamera(
@@ -123,12 +124,12 @@ def test_the_rigs_step_comes_back_from_two_photographs_of_a_resting_board(turn):
     step = transform(Rotation.from_rotvec(turn).as_matrix(), (0.004, 0.001, 0.0))
     T_range_rig = np.linalg.matrix_power(step, 8)
     after = inverse(T_range_rig @ T_range_camera) @ T_range_camera @ POSES[0]
-    assert np.allclose(one_step(POSES[0], after, BOARD, T_range_camera, CalibrateOptions(steps=8)), step, atol=1e-9)
+    assert np.allclose(one_step(POSES[0], after, BOARD, T_range_camera, 8, None), step, atol=1e-9)
     if turn[2] == 0.0:
-        longer = one_step(POSES[0], after, BOARD, T_range_camera, CalibrateOptions(steps=8, step_m=0.005))
+        longer = one_step(POSES[0], after, BOARD, T_range_camera, 8, 0.005)
         assert np.linalg.norm(longer[:3, 3]) == pytest.approx(0.005) and longer[0, 3] / longer[1, 3] == pytest.approx(4.0)
         with pytest.raises(BadInput, match="moved"):
-            one_step(POSES[0], POSES[0], BOARD, T_range_camera, CalibrateOptions(steps=8))
+            one_step(POSES[0], POSES[0], BOARD, T_range_camera, 8, None)
 
 
 @pytest.mark.parametrize("change", [{"columns": 1}, {"rows": 500}, {"square": 0.0}, {"pattern": "stars"}])

@@ -67,8 +67,7 @@ def _at(image: NDArray, uv: NDArray) -> NDArray:
 
 def on_board(uv: NDArray, camera: StripeCamera, T_camera_board: NDArray, board: Board) -> NDArray | None:
     """Where a stripe's peaks lie on the board (n, 3) [m], in the camera's frame, without those off its straight line; None if too few."""
-    plane = np.array([*T_camera_board[:3, 2], T_camera_board[:3, 2] @ T_camera_board[:3, 3]])
-    points = points_on_planes(replace(camera, T_range_camera=np.eye(4)), uv, plane)
+    points = points_on_board(uv, camera, T_camera_board)
     points = points[np.isfinite(points).all(axis=1)]
     on_board = apply(inverse(T_camera_board), points)
     held = board.holds(on_board)
@@ -79,6 +78,12 @@ def on_board(uv: NDArray, camera: StripeCamera, T_camera_board: NDArray, board: 
     if len(straight) < max(LEAST_PEAKS, STRAIGHT_SHARE * len(points)):
         return None
     return points[straight[_of_one_run(flat[straight])]]
+
+
+def points_on_board(uv: NDArray, camera: StripeCamera, T_camera_board: NDArray) -> NDArray:
+    """Where the rays of pixels (n, 2) meet a board's face, (n, 3) [m] in the camera's frame."""
+    plane = np.array([*T_camera_board[:3, 2], T_camera_board[:3, 2] @ T_camera_board[:3, 3]])
+    return points_on_planes(replace(camera, T_range_camera=np.eye(4)), uv, plane)
 
 
 def _of_one_run(points: NDArray) -> NDArray:

@@ -1,8 +1,7 @@
 """Calibrating a stripe camera and its laser from photographs of a board that the stripe crosses.
 
-The folder's convention: `NAME.png` shows the board, `NAME.laser.png` the same with the laser on and nothing moved. Where no photograph
-has a partner, the stripe is looked for in the board's photographs themselves. `NAME.moved.png` shows the board of `NAME.png`
-after the rig made some steps: that gives the step.
+Some show the board with the laser off, some with the laser on, some both ways without anything moved (`board_photographs` tells which).
+`NAME.moved.png` shows the board of `NAME.png` after the rig made some steps: that gives the step.
 """
 
 from collections.abc import Sequence
@@ -11,24 +10,31 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, logm
 
 from handey_studio.base import BadInput, Progress, Silent
-from handey_studio.geometry.transforms import apply, inverse, rotation_angle, transform
-from handey_studio.sensing.stripes.board import Board, CameraFit, find_corners, fit_camera, place_boards
-from handey_studio.sensing.stripes.board_stripes import LitBoard, board_stripes
+from handey_studio.sensing.stripes.board import Board, CameraFit, fit_camera, place_boards
+from handey_studio.sensing.stripes.board_photographs import (
+    LASER,
+    MOVED,
+    BoardPhotograph,
+    board_corners,
+    look_at_boards,
+    partner_by_name,
+    partners,
+)
+from handey_studio.sensing.stripes.board_stripes import LitBoard, board_stripes, points_on_board
+from handey_studio.sensing.stripes.bundle import bundle
 from handey_studio.sensing.stripes.instrument import Instrument
 from handey_studio.sensing.stripes.laser_planes import PlaneFit, distances, fit_plane
-from handey_studio.sensing.stripes.photographs import SUFFIXES, Photograph, list_photographs, read_photograph
-from handey_studio.sensing.stripes.stripe_camera import StripeCamera
+from handey_studio.sensing.stripes.photographs import read_photograph
+from handey_studio.sensing.stripes.rig_frames import one_step, range_frame
+from handey_studio.sensing.stripes.stripe_camera import StripeCamera, points_on_planes
 from handey_studio.sensing.stripes.stripe_light import LaserColour
 from handey_studio.sensing.stripes.stripe_peaks import PeakOptions
 
-LASER, MOVED = "laser", "moved"
 EACH = 100  # points of each board that the plane is fitted to, so that every pose counts alike
 SPREAD = (10.0, 0.02)  # least extent across the stripes: times the points' rms, and of their extent along
-LEAST_STEP_M = 1e-6
-PURE_SHIFT_RAD = np.deg2rad(0.5)  # a rig that turns by less between two photographs only shifts
+STRAY_PX, STRAY = 1.0, 4.0  # a stripe farther off than this, and than so many times the others' median, is not the laser's on that board
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,9 @@ class CalibrateOptions:
 class Calibration:
     """The instrument, and how well the photographs agree with it.
 
-    `camera_rms_px` by photograph's name; `stripe_rms` [m] how far each board's stripe lies off the laser's plane, `plane_rms` over all;
+    `camera_rms_px` by photograph's name; `stripe_rms` [m] how far each board's stripe lies off the laser's plane, `plane_rms` over all.
+    `board_rms` [m] is how far each stripe, triangulated with the plane through the other boards' stripes, lies in front of or behind its
+    board, and `board_per_px` [m] what a pixel's error of the stripe makes there: an instrument's precision and its geometry's.
     `spread` [m] is the extent of the stripes' points across their main direction, `tilt_deviation` [rad] what the plane may turn by.
     `left_out` tells why photographs were not used.
     """
@@ -59,6 +67,8 @@ class Calibration:
     camera_rms_px: dict[str, float]
     stripe_rms: dict[str, float]
     plane_rms: float
+    board_rms: dict[str, float]
+    board_per_px: float
     spread: float
     tilt_deviation: float
     table: str
@@ -66,110 +76,130 @@ class Calibration:
     colour: LaserColour
 
 
-@dataclass(frozen=True, eq=False)
-class _Boards:
-    """Photographs in which the board was found: their names, files and corners."""
-
-    names: list[str]
-    paths: list[Path]
-    corners: list[NDArray]
-    size: tuple[int, int]
-
-
 def calibrate(
-    folder: Path,
+    folders: Path | Sequence[Path],
     board: Board,
     camera: StripeCamera | None = None,
     options: CalibrateOptions = CalibrateOptions(),
     progress: Progress = Silent(),
 ) -> Calibration:
-    """Camera and laser plane from a folder of board photographs; a `camera` that is known is kept.
+    """Camera and laser plane from a folder of board photographs, or several; a `camera` that is known is kept.
 
     Raises BadInput with one sentence when the photographs do not determine them, and says what would.
     """
     left_out: dict[str, str] = {}
-    paths = [path for path in list_photographs(folder) if not path.stem.endswith((f".{LASER}", f".{MOVED}"))]
-    lasers = {path.stem: partner for path in paths if (partner := _partner(path, LASER)) is not None}
-    boards = _find_boards(paths, board, left_out, progress)
-    fit = place_boards(board, boards.corners, camera) if camera is not None else fit_camera(board, boards.corners, boards.size)
-    for name, used in zip(boards.names, fit.used, strict=True):
-        if not used:
-            left_out[name] = "its corners contradict the other photographs"
-    names = [name for name, used in zip(boards.names, fit.used, strict=True) if used]
-    files = [path for path, used in zip(boards.paths, fit.used, strict=True) if used]
+    photographs = look_at_boards([folders] if isinstance(folders, Path) else folders, board, left_out, progress)
+    lasers = partners(photographs)
+    photographs = [one for one in photographs if one.path not in lasers.values()]
+    left_out |= {one.name: "the board was not found" for one in photographs if one.corners is None}
+    found = [one for one in photographs if one.corners is not None]
+    corners = [one.corners for one in found if one.corners is not None]
+    fit = place_boards(board, corners, camera) if camera is not None else fit_camera(board, corners, found[0].size)
+    left_out |= {one.name: "its corners contradict the other photographs" for one, used in zip(found, fit.used, strict=True) if not used}
+    found = [one for one, used in zip(found, fit.used, strict=True) if used]
+    colour, stripes = _stripes(found, lasers, board, fit, options, left_out)
+    fit, plane = _together(board, found, stripes, fit, camera is not None, left_out)
+    return _calibration(fit, plane, found, stripes, board, options, left_out, colour)
+
+
+def _stripes(
+    found: Sequence[BoardPhotograph],
+    lasers: dict[str, Path],
+    board: Board,
+    fit: CameraFit,
+    options: CalibrateOptions,
+    left_out: dict[str, str],
+) -> tuple[LaserColour, dict[str, NDArray]]:
+    """The laser's colour, and by photograph's name the stripe on its board, (k, 2) [px]."""
     lit = {
-        path.stem: LitBoard(lasers.get(path.stem, path), path if lasers else None, T)
-        for path, T in zip(files, fit.Ts_camera_board, strict=True)
+        one.name: LitBoard(lasers.get(one.name, one.path), one.path if lasers else None, T)
+        for one, T in zip(found, fit.Ts_camera_board, strict=True)
+        if not lasers or one.name in lasers
     }
-    lit = {name: one for name, one in lit.items() if not lasers or name in lasers}
     if not lit:
         raise BadInput(f"none of the photographs in which the board was found has a partner NAME.{LASER}.png with the laser on.")
-    colour, found = board_stripes(list(lit.values()), board, fit.camera, options.channel, options.peaks)
-    stripes = {name: points for name, points in zip(lit, found, strict=True) if points is not None}
-    left_out |= {f"{name}, its stripe": "no straight stripe was found on the board" for name in lit if name not in stripes}
-    return _calibration(fit, names, stripes, board, boards, options, left_out, colour)
+    colour, points = board_stripes(list(lit.values()), board, fit.camera, options.channel, options.peaks)
+    left_out |= {
+        f"{name}, its stripe": "no straight stripe was found on the board" for name, one in zip(lit, points, strict=True) if one is None
+    }
+    return colour, {name: fit.camera.project(one) for name, one in zip(lit, points, strict=True) if one is not None}
 
 
-def _partner(path: Path, kind: str) -> Path | None:
-    return next((one for suffix in SUFFIXES if (one := path.with_name(f"{path.stem}.{kind}{suffix}")).is_file()), None)
+def _together(
+    board: Board,
+    found: Sequence[BoardPhotograph],
+    stripes: dict[str, NDArray],
+    fit: CameraFit,
+    keep: bool,
+    left_out: dict[str, str],
+) -> tuple[CameraFit, NDArray]:
+    """Camera, poses and the laser's plane (4,) that agree best; takes the stripes out that contradict the others."""
+    names, corners = [one.name for one in found], [one.corners for one in found if one.corners is not None]
+    start = laser_plane(list(_points(fit, names, stripes).values())).plane
+    refined = bundle(board, corners, [stripes.get(name) for name in names], fit, start, keep)
+    off = _off_boards(refined.fit, names, stripes)
+    limit = max(STRAY_PX, STRAY * float(np.median([rms / per_px for rms, per_px in off.values()]))) if off else np.inf
+    strays = [name for name, (rms, per_px) in off.items() if rms > limit * per_px]
+    for name in strays:
+        del stripes[name]
+        left_out[f"{name}, its stripe"] = "it contradicts the other boards' stripes"
+    if strays:
+        start = laser_plane(list(_points(fit, names, stripes).values())).plane
+        refined = bundle(board, corners, [stripes.get(name) for name in names], fit, start, keep)
+    return refined.fit, refined.plane
 
 
-def _find_boards(paths: Sequence[Path], board: Board, left_out: dict[str, str], progress: Progress) -> _Boards:
-    found = _Boards([], [], [], (0, 0))
-    for k, path in enumerate(paths):
-        if progress.cancelled:
-            break
-        progress.report(k / len(paths), f"looking for the board in {path.name}")
-        photograph = read_photograph(path)
-        if found.names and photograph.size != found.size:
-            raise BadInput(f'photograph "{path}" is {photograph.size} px and others are {found.size} px; one camera has one size.')
-        corners = _corners(photograph, board)
-        if corners is None:
-            left_out[path.stem] = "the board was not found"
+def _points(fit: CameraFit, names: Sequence[str], stripes: dict[str, NDArray]) -> dict[str, NDArray]:
+    """Where the stripes fall on their boards: points (k, 3) [m] of the camera's frame, by photograph's name."""
+    poses = dict(zip(names, fit.Ts_camera_board, strict=True))
+    return {name: points_on_board(uv, fit.camera, poses[name]) for name, uv in stripes.items()}
+
+
+def _off_boards(fit: CameraFit, names: Sequence[str], stripes: dict[str, NDArray]) -> dict[str, tuple[float, float]]:
+    """Each stripe's rms distance [m] off its board by the plane through the other boards' stripes, and what a pixel makes there [m]."""
+    points, poses = _points(fit, names, stripes), dict(zip(names, fit.Ts_camera_board, strict=True))
+    camera, off = replace(fit.camera, T_range_camera=np.eye(4)), {}
+    for name, uv in stripes.items():
+        others = [one for other, one in points.items() if other != name]
+        if len(others) < 2 or not _determined(plane := _fit_stripes(others)):
             continue
-        found = _Boards([*found.names, path.stem], [*found.paths, path], [*found.corners, corners], photograph.size)
-    if not found.names:
-        raise BadInput(
-            f"no photograph of {len(paths)} shows a {board.pattern} of {board.columns} × {board.rows} inner corners "
-            "(a board of 10 × 7 squares has 9 × 6)."
+        across = np.eye(2)[int(np.argmin(np.ptp(uv, axis=0)))]
+        away, nudged = (
+            (points_on_planes(camera, uv + step * across, plane.plane) - poses[name][:3, 3]) @ poses[name][:3, 2] for step in (0.0, 1.0)
         )
-    return found
-
-
-def _corners(photograph: Photograph, board: Board) -> NDArray | None:
-    """The board in a photograph: in all its light, else in the colour in which a laser across it may be dark."""
-    corners = find_corners(photograph.light.mean(axis=2), board)
-    if corners is not None:
-        return corners
-    singles = (find_corners(photograph.light[..., channel], board, thorough=False) for channel in (0, 2, 1))
-    return next((corners for corners in singles if corners is not None), None)
+        off[name] = (float(np.sqrt(np.nanmean(away**2))), float(np.nanmedian(np.abs(nudged - away))))
+    return off
 
 
 def _calibration(
     fit: CameraFit,
-    names: list[str],
+    plane: NDArray,
+    found: Sequence[BoardPhotograph],
     stripes: dict[str, NDArray],
     board: Board,
-    boards: _Boards,
     options: CalibrateOptions,
     left_out: dict[str, str],
     colour: LaserColour,
 ) -> Calibration:
-    plane = laser_plane(list(stripes.values()))
+    names = [one.name for one in found]
+    points, off = _points(fit, names, stripes), _off_boards(fit, names, stripes)
+    spread = laser_plane(list(points.values())).extents[1]
+    rms = {name: float(np.sqrt(np.mean(distances(plane, one) ** 2))) for name, one in points.items()}
+    plane_rms = float(np.sqrt(np.mean(np.square(list(rms.values())))))
     table = _table(names, options)
     T_range_camera = range_frame(fit.Ts_camera_board[names.index(table)], board)
-    normal = T_range_camera[:3, :3] @ plane.plane[:3]
-    in_range = np.array([*normal, plane.plane[3] + normal @ T_range_camera[:3, 3]])
-    camera = replace(fit.camera, T_range_camera=T_range_camera)
-    step = _rig_step(boards, board, fit, names, T_range_camera, options)
-    rms = {name: float(np.sqrt(np.mean(distances(plane.plane, points) ** 2))) for name, points in stripes.items()}
+    normal = T_range_camera[:3, :3] @ plane[:3]
+    in_range = np.array([*normal, plane[3] + normal @ T_range_camera[:3, 3]])
+    step = _rig_step(found, board, fit, T_range_camera, options)
     return Calibration(
-        instrument=Instrument((camera,), ("",), in_range[None], rig_step=step),
+        instrument=Instrument((replace(fit.camera, T_range_camera=T_range_camera),), ("",), in_range[None], rig_step=step),
         camera_rms_px=dict(zip(names, fit.rms_px.tolist(), strict=True)),
         stripe_rms=rms,
-        plane_rms=plane.rms,
-        spread=float(plane.extents[1]),
-        tilt_deviation=plane.rms / float(plane.extents[1]) / np.sqrt(len(stripes)),
+        plane_rms=plane_rms,
+        board_rms={name: one for name, (one, _) in off.items()},
+        board_per_px=float(np.median([per_px for _, per_px in off.values()])) if off else 0.0,
+        spread=float(spread),
+        tilt_deviation=plane_rms / float(spread) / np.sqrt(len(stripes)),
         table=table,
         left_out=left_out,
         colour=colour,
@@ -180,8 +210,8 @@ def laser_plane(stripes: Sequence[NDArray]) -> PlaneFit:
     """The laser's plane through its stripes on boards, each (n, 3) [m]. Raises BadInput when they do not determine it."""
     if len(stripes) < 2:
         raise BadInput(f"a straight stripe was found on the board in {len(stripes)} photographs; at least 2 poses of the board are needed.")
-    plane = fit_plane(np.concatenate([_thinned(points) for points in stripes]))
-    if not plane.extents[1] >= max(SPREAD[0] * plane.rms, SPREAD[1] * plane.extents[0]):
+    plane = _fit_stripes(stripes)
+    if not _determined(plane):
         raise BadInput(
             f"the stripes on the {len(stripes)} boards lie along one line (they spread {1e3 * plane.extents[1]:.2f} mm across it), "
             "so the laser's plane may turn about it; move the board towards the camera, or tilt it the other way."
@@ -189,8 +219,12 @@ def laser_plane(stripes: Sequence[NDArray]) -> PlaneFit:
     return plane
 
 
-def _thinned(points: NDArray) -> NDArray:
-    return points[np.linspace(0, len(points) - 1, EACH).round().astype(int)]
+def _fit_stripes(stripes: Sequence[NDArray]) -> PlaneFit:
+    return fit_plane(np.concatenate([points[np.linspace(0, len(points) - 1, EACH).round().astype(int)] for points in stripes]))
+
+
+def _determined(plane: PlaneFit) -> bool:
+    return bool(plane.extents[1] >= max(SPREAD[0] * plane.rms, SPREAD[1] * plane.extents[0]))
 
 
 def _table(names: list[str], options: CalibrateOptions) -> str:
@@ -201,50 +235,17 @@ def _table(names: list[str], options: CalibrateOptions) -> str:
     return options.table
 
 
-def range_frame(T_camera_board: NDArray, board: Board) -> NDArray:
-    """T_range_camera for the range frame on a board: origin in its middle, z out of it, x as near to the photograph's rows as can be.
-
-    The board's own corners could be counted from either end, so its axes are not used.
-    """
-    origin = apply(T_camera_board, board.corners.mean(axis=0))
-    up = T_camera_board[:3, 2] * (-1.0 if T_camera_board[:3, 2] @ origin > 0 else 1.0)
-    x = np.array([1.0, 0.0, 0.0]) - up[0] * up
-    x /= np.linalg.norm(x)
-    return inverse(transform(np.stack([x, np.cross(up, x), up], axis=1), origin))
-
-
 def _rig_step(
-    boards: _Boards, board: Board, fit: CameraFit, names: list[str], T_range_camera: NDArray, options: CalibrateOptions
+    found: Sequence[BoardPhotograph], board: Board, fit: CameraFit, T_range_camera: NDArray, options: CalibrateOptions
 ) -> NDArray | None:
     """T_range_rig of one step, from the photographs of boards that stayed while the rig moved; None without such."""
-    poses = dict(zip(names, fit.Ts_camera_board, strict=True))
-    for path in boards.paths:
-        moved = _partner(path, MOVED)
-        if moved is None or path.stem not in poses:
+    for one, before in zip(found, fit.Ts_camera_board, strict=True):
+        moved = partner_by_name(one.path, MOVED)
+        if moved is None:
             continue
-        corners = _corners(read_photograph(moved), board)
+        corners = board_corners(read_photograph(moved), board)
         if corners is None:
             raise BadInput(f'the board was not found in "{moved}".')
         after = place_boards(board, [corners], fit.camera).Ts_camera_board[0]
-        return one_step(poses[path.stem], after, board, T_range_camera, options)
+        return one_step(before, after, board, T_range_camera, options.steps, options.step_m)
     return None
-
-
-def one_step(before: NDArray, after: NDArray, board: Board, T_range_camera: NDArray, options: CalibrateOptions) -> NDArray:
-    """The rig's step from a resting board's poses before the camera, before and after some steps."""
-    T_before_after = before @ inverse(after)
-    if rotation_angle(T_before_after[:3, :3]) < PURE_SHIFT_RAD:
-        middle = board.corners.mean(axis=0)
-        shift = apply(before, middle) - apply(after, middle)
-        length = np.linalg.norm(shift) / options.steps
-        if not length > LEAST_STEP_M:
-            raise BadInput(
-                f"the board moved by {1e3 * length * options.steps:.3f} mm only before the camera, so the rig's step is not known."
-            )
-        return transform(
-            None, T_range_camera[:3, :3] @ shift / options.steps * (1.0 if options.step_m is None else options.step_m / length)
-        )
-    T_range = T_range_camera @ T_before_after @ inverse(T_range_camera)
-    step = np.real(expm(np.asarray(logm(T_range)) / options.steps))
-    u, _, vh = np.linalg.svd(step[:3, :3])
-    return transform(u @ vh, step[:3, 3])
