@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from handey_studio.base import Value, frozen_array
+from handey_studio.base import BadInput, Value, frozen_array
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ class Orthographic:
 
 @dataclass(frozen=True, eq=False)
 class DepthView(Value):
-    """A depth image. `depth` (H, W) [m] along the optical axis, NaN where there is no reading.
+    """A depth image. `depth` (H, W) [m] along the optical axis, NaN where there is no reading; what cannot be one, endless or behind
+    the eye, becomes NaN. BadInput for an image without pixels.
 
     `T_world_sensor` maps the optical frame (x right, y down, z forward) to the world. `noise` [m] is the standard
     deviation of a reading on a plane; `outline_error` [m] how far a silhouette may lie off sideways, as depth cameras
@@ -81,10 +82,19 @@ class DepthView(Value):
     rim_px: float = 0.5
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "depth", frozen_array(self.depth))
+        object.__setattr__(self, "depth", frozen_array(_readings(np.asarray(self.depth), self.projection)))
         object.__setattr__(self, "T_world_sensor", frozen_array(self.T_world_sensor))
 
     def points_sensor(self) -> NDArray:
         """Points (H, W, 3) [m] in the optical frame, NaN where there is no reading."""
         v, u = np.mgrid[: self.depth.shape[0], : self.depth.shape[1]]
         return self.projection.unproject(np.stack([u, v], axis=-1).astype(float), self.depth)
+
+
+def _readings(depth: NDArray, projection: Pinhole | Orthographic) -> NDArray:
+    """A depth image (H, W) with NaN for what cannot be a reading."""
+    if depth.ndim != 2 or not depth.size:
+        raise BadInput(f"a depth image must be a table of one pixel or more, not of shape {depth.shape}.")
+    least = 0.0 if isinstance(projection, Pinhole) else -np.inf
+    impossible = (depth <= least) | (depth == np.inf)
+    return np.where(impossible, np.nan, depth) if impossible.any() else depth

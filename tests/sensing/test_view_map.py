@@ -107,3 +107,17 @@ def test_views_and_grids_that_make_no_map_are_told():
         depth_map_of(view, 0.002, (0.1, 0.1), (0.1, 0.2))
     with pytest.raises(BadInput, match="not usable"):
         depth_map_of(view, 0.00001)
+
+
+@pytest.mark.parametrize("impossible", [np.inf, -np.inf, 0.0, -0.5])
+def test_what_cannot_be_a_reading_is_none(impossible):
+    depth = np.full((4, 6), 0.8)
+    depth[1:3, 2:4] = impossible
+    view = DepthView(depth, Pinhole(100.0, 100.0, 3.0, 2.0))
+    assert np.isnan(view.depth[1:3, 2:4]).all() and np.isfinite(view.depth).sum() == 20
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (0, 5), (7,), (2, 2, 2)])
+def test_an_image_without_pixels_is_refused_in_one_sentence(shape):
+    with pytest.raises(BadInput, match="a depth image must be a table"):
+        DepthView(np.zeros(shape), Pinhole(100.0, 100.0, 3.0, 2.0))
