@@ -8,13 +8,18 @@ from handey_studio.commands.arguments import DONE, Lines, board_size, check_outp
 
 NAME = "scan calibrate"
 HELP = (
-    "camera and laser plane from photographs of a flat board: NAME.png shows the board, NAME.laser.png the same with the laser on "
-    "(without such partners the stripe is looked for in the board's photographs), NAME.moved.png the same board after the rig's steps"
+    "camera and laser plane from photographs of a flat board, with the laser off and on and nothing moved in between (NAME.png and "
+    "NAME.laser.png, or any names: partners show one pose), or with the laser on only; NAME.moved.png: the same board after the rig's steps"
 )
 
 
 def add_arguments(calibrate: argparse.ArgumentParser) -> None:
-    calibrate.add_argument("folder", type=Path, help="the board's photographs: at least 3 poses, tilted both ways by some 30°")
+    calibrate.add_argument(
+        "folder",
+        type=Path,
+        nargs="+",
+        help="the board's photographs, in one folder or several: at least 3 poses, tilted by some 30°",
+    )
     calibrate.add_argument(
         "--board", required=True, type=board_size, metavar="COLSxROWS", help="its INNER corners: 10 × 7 squares have 9x6"
     )

@@ -64,6 +64,8 @@ def calibration_report(found: Calibration) -> dict[str, Any]:
         "laser": found.colour.name,
         "plane_rms_m": found.plane_rms,
         "stripe_rms_m": found.stripe_rms,
+        "board_rms_m": found.board_rms,
+        "board_m_per_px": found.board_per_px,
         "spread_m": found.spread,
         "tilt_deviation_deg": float(np.rad2deg(found.tilt_deviation)),
         "table": found.table,
@@ -84,6 +86,13 @@ def calibration_lines(report: dict[str, Any]) -> list[str]:
         f"{report['tilt_deviation_deg']:.3f}°",
         f'z = 0 is the board of photograph "{report["table"]}"',
     ]
+    if report["board_rms_m"]:
+        off = sorted(report["board_rms_m"].values())
+        lines.insert(
+            2,
+            f"by the other boards' laser plane each stripe lies {1e3 * off[len(off) // 2]:.2f} mm rms off its board (median; worst "
+            f"{1e3 * off[-1]:.2f}); a stripe read a pixel off is {1e3 * report['board_m_per_px']:.2f} mm there",
+        )
     if report["rig_step_m"] is not None:
         lines.append("the rig steps by " + ", ".join(f"{1e3 * value:.4f}" for value in report["rig_step_m"]) + " mm")
     return lines + [f"  left out: {name}: {reason}" for name, reason in report["left_out"].items()]
