@@ -20,7 +20,8 @@ from handey_studio.sensing.stripes.photographs import SUFFIXES, Photograph, list
 LASER, MOVED = "laser", "moved"
 SMALL_PX = 640  # longer side of the small copies by which photographs are compared
 STILL = 0.002  # of the photograph's longer side: corners that moved by less did not move
-ALIKE = 6.0  # of 255: median difference, about the board, of two photographs of one pose
+MOST = 0.85  # of the corners, and of the pixels about the board: a stripe crosses fewer, a board that moved leaves more
+ALIKE = 25.0  # of 255: greatest difference of most pixels about the board
 LIT_SHARE, LEAST_LIT = 0.002, 8.0  # of a photograph's pixels that a stripe covers, and the light, of 255, that it adds there
 
 
@@ -101,12 +102,12 @@ def _one_pose(seen: BoardPhotograph, other: BoardPhotograph) -> bool:
     if corners is None:
         return False
     if other.corners is not None:
-        apart = min(float(np.median(np.linalg.norm(one - corners, axis=1))) for one in (other.corners, other.corners[::-1]))
-        return apart <= STILL * max(seen.size)
+        apart = np.linalg.norm(other.corners[:, None] - corners, axis=2).min(axis=1)  # a square board may be counted from any corner
+        return float(np.quantile(apart, MOST)) <= STILL * max(seen.size)
     scale = max(seen.small.shape) / max(seen.size)
     (left, top), (right, bottom) = np.floor(corners.min(axis=0) * scale).astype(int), np.ceil(corners.max(axis=0) * scale).astype(int)
     a, b = (one.small[max(0, top) : bottom + 1, max(0, left) : right + 1] for one in (seen, other))
-    return float(np.median(np.abs(a - b))) <= ALIKE
+    return float(np.quantile(np.abs(a - b), MOST)) <= ALIKE
 
 
 def _more_lit(one: BoardPhotograph, other: BoardPhotograph) -> bool:
