@@ -24,7 +24,7 @@ def add_arguments(move: argparse.ArgumentParser) -> None:
     add_common(move)
     move.add_argument("--resume", action="store_true", help="go on where the saved session stopped: what is done is not done again")
     move.add_argument("--step", action="store_true", help="only the next command")
-    move.add_argument("--go-on", action="store_true", help="take the next command after one that failed")
+    move.add_argument("--go-on", action="store_true", help="postpone a command that went wrong in the cell too, instead of ending there")
     move.add_argument(
         "--attempts", type=positive, help="how often a MOVE is tried, the first time among them, instead of the session's own"
     )
@@ -55,7 +55,7 @@ def run(given: argparse.Namespace) -> int:
     states = states_of(session)
     for number, (command, state) in enumerate(zip(session.commands, states, strict=True), 1):
         if len(states) > 1:
-            print(f"{number:3d} {state.status:8} MOVE {command.part} TO {command.to}")
+            print(f"{number:3d} {state.status:9} MOVE {command.part} TO {command.to}")
     write_outputs(given, session, library, session.results[earlier:])
     return DONE if all(state.status in ("done", "skipped") for state in states) else FAILED
 

@@ -17,7 +17,6 @@ from handey_studio.task.bench.act import Trial
 from handey_studio.task.bench.shared_out import shared_out
 from handey_studio.world import Library
 
-ROUNDS = 3  # commands that failed are run again when the others are over: what lay on the part may be gone
 NEAR_M = 0.003  # a part this near to where its result says it was put is where it was put
 
 
@@ -61,16 +60,14 @@ def _sorted(trial: Trial, seed: int) -> dict[str, Any] | str:
 
 def _line(row: dict[str, Any]) -> str:
     times = f"{row['cell_s']:.0f} s of the cell's time, {row['wall_s']:.0f} s"
-    done = f"{row['done']} of {row['commands']} done, {row['truly']} truly there, {row['rounds']} rounds"
+    done = f"{row['done']} of {row['commands']} done, {row['truly']} truly there, {row['postponed']} times postponed"
     return f"{row['seed']:4d} {done}, {row['incidents']} incidents, {times}; {'; '.join(row['failed'])[:300]}"
 
 
 def _row(seed: int, session: Session, library: Library) -> dict[str, Any]:
     """One sequence, judged by the truth."""
-    begun, rounds = time.perf_counter(), 0
-    while rounds < ROUNDS and any(state.status != "done" for state in states_of(session)):
-        session = run_list(session, library, _Quiet(), go_on=True)
-        rounds += 1
+    begun = time.perf_counter()
+    session = run_list(session, library, _Quiet(), go_on=True)
     states = states_of(session)
     performances = [performance for result in session.results for performance in result.performances]
     return {
@@ -78,7 +75,7 @@ def _row(seed: int, session: Session, library: Library) -> dict[str, Any]:
         "commands": len(states),
         "done": sum(state.status == "done" for state in states),
         "truly": _truly(session, library),
-        "rounds": rounds,
+        "postponed": sum(result.status != "done" for result in session.results),
         "incidents": sum(len(performance.incidents) for performance in performances),
         "failed": [session.results[state.result].reason for state in states if state.status == "failed"],
         "cell_s": sum(performance.seconds for performance in performances),

@@ -1,4 +1,8 @@
-"""A session's commands as a list that is run: all of them, one at a time, and on from where it stopped."""
+"""A session's commands as a list that is run: all of them, one at a time, and on from where it stopped.
+
+A command that cannot be planned is postponed, and comes back when others changed the pile: what lay on its part may be gone. Only what
+needs it waits with it.
+"""
 
 from collections import Counter
 from dataclasses import replace
@@ -23,8 +27,15 @@ def states_of(session: Session) -> tuple[CommandState, ...]:
 
 
 def next_command(session: Session) -> int | None:
-    """The number of the first command that is not over, None if all are: there a run goes on."""
-    return next((number for number, state in enumerate(states_of(session)) if state.status not in OVER), None)
+    """The number of the command that a run takes next, None if there is none: the first that is not over, and when all had their turn, the
+    first of the postponed, if anything was done since."""
+    states = states_of(session)
+    left = [number for number, state in enumerate(states) if state.status not in OVER]
+    ready = [number for number in left if not any(_needs(session, number, other) for other in left if other < number)]
+    done = max((state.result for state in states if state.status == "done"), default=-1)
+    first = [number for number in ready if states[number].status != "postponed"]
+    again = [number for number in ready if states[number].status == "postponed" and states[number].result < done]
+    return next(iter([*first, *again]), None)
 
 
 def last_run(session: Session) -> int:
@@ -50,30 +61,32 @@ def run_list(
     most: int | None = None,
     go_on: bool = False,
 ) -> Session:
-    """Run the session's commands from the first that is not over: all of them, or at most `most` (1 is a step).
+    """Run the session's commands that are not over: all of them, or at most `most` (1 is a step).
 
-    A command that fails ends the run, or with `go_on` the next one is taken. Cancelled, the command that was running waits again. Shows the
-    session with each new state. Raises BadInput for a command that means nothing here, before anything moves.
+    One that cannot be planned is postponed, and failed when nothing that is done helps it. One that goes wrong in the cell ends the run, or
+    with `go_on` is postponed too. Cancelled, the command that was running waits again. Shows the session with each new state. Raises
+    BadInput for a command that means nothing here, before anything moves.
     """
     station, cell = station_of(session, library), cell_of(session, library)
-    wanted = [number for number, state in enumerate(states_of(session)) if state.status not in OVER][:most]
-    for number in wanted:
-        check_command(session.commands[number], station.models)
-    after = None
-    for count, number in enumerate(wanted):
+    for command, state in zip(session.commands, states_of(session), strict=True):
+        if state.status not in OVER:
+            check_command(command, station.models)
+    after, ran = None, 0
+    while ran != most and (number := next_command(session)) is not None:
         session = _with_state(session, number, CommandState("running"))
         progress.show(session)
-        share = Share(progress, count / len(wanted), (count + 1) / len(wanted))
+        over = sum(state.status in OVER for state in states_of(session))
+        share = Share(progress, over / len(session.commands), (over + 1) / len(session.commands))
         outcome = _one(session, number, station, cell, after, share)
-        after = outcome.after
-        session = _with_outcome(session, number, outcome, cell)
-        undone = states_of(session)[number].status != "done"
+        after, ran = outcome.after, ran + 1
+        session = _with_outcome(session, number, outcome, cell, go_on)
+        status = states_of(session)[number].status
         if progress.cancelled:
-            return _with_state(session, number, WAITING) if undone else session
+            return _with_state(session, number, WAITING) if status != "done" else session
         progress.show(session)
-        if undone and not go_on:
+        if status == "failed":
             break
-    return session
+    return session if next_command(session) is not None else _given_up(session)
 
 
 def _one(session: Session, number: int, station: Station, cell: Cell, scene: Scene | None, progress: Share) -> Outcome:
@@ -94,13 +107,32 @@ def _settled(session: Session, number: int) -> tuple[tuple[str, float, float, fl
     return tuple(found)
 
 
-def _with_outcome(session: Session, number: int, outcome: Outcome, cell: SimulatedCell) -> Session:
+def _needs(session: Session, number: int, earlier: int) -> bool:
+    """Whether a command means the same part as an earlier one, or puts its own on that part: then it comes after it."""
+    command, other = session.commands[number], session.commands[earlier]
+    kind = base_name(other.part)
+    if command.to.startswith("on:") and base_name(command.to.split(":")[1]) == kind:
+        return True
+    several = sum(placed.part.name == kind for placed in session.located) > 1
+    return command.part == other.part and (other.part != kind or not several)
+
+
+def _with_outcome(session: Session, number: int, outcome: Outcome, cell: SimulatedCell, go_on: bool) -> Session:
     """The session after a command: its result is the one that is looked at."""
-    results = (*session.results, outcome.result)
-    status = "done" if outcome.result.status == "done" else "failed"
+    result = outcome.result
+    results = (*session.results, result)
+    status = "done" if result.status == "done" else "postponed" if go_on or not result.performances else "failed"
     view = replace(session.view, result=-1, time_s=0.0, hypothesis=-1, edge=-1)
     session = replace(session, scene=outcome.scene or session.scene, results=results, cell_now=cell.setup_now(), view=view)
     return _with_state(session, number, CommandState(status, len(results) - 1))
+
+
+def _given_up(session: Session) -> Session:
+    """The session when no command can have a turn: what is postponed has failed."""
+    if all(state.status != "postponed" for state in session.states):
+        return session
+    states = (replace(state, status="failed") if state.status == "postponed" else state for state in states_of(session))
+    return replace(session, states=tuple(states))
 
 
 def _with_state(session: Session, number: int, state: CommandState) -> Session:
@@ -111,6 +143,6 @@ def _with_state(session: Session, number: int, state: CommandState) -> Session:
 
 def _valid(session: Session, number: int, state: CommandState) -> CommandState:
     if state.result < 0:
-        return WAITING if state.status in ("done", "failed") else state
+        return WAITING if state.status in ("done", "failed", "postponed") else state
     mine = session.results[state.result] if state.result < len(session.results) else None
     return state if mine is not None and mine.command == session.commands[number] else WAITING

@@ -59,9 +59,10 @@ class ViewState(Value):
 
 @dataclass(frozen=True)
 class CommandState:
-    """How far a command of the session's list is. `result` counts the session's results, -1 while it has none."""
+    """How far a command of the session's list is. `result` counts the session's results, -1 while it has none; that of a command which is
+    postponed tells why."""
 
-    status: Literal["waiting", "running", "done", "failed", "skipped"] = "waiting"
+    status: Literal["waiting", "running", "done", "postponed", "failed", "skipped"] = "waiting"
     result: int = -1
 
 

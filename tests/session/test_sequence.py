@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from handey_studio.base import BadInput
+from handey_studio.cell.workcell import TrueBody
+from handey_studio.geometry.transforms import from_xyz_rpy
 from handey_studio.session import CommandState, Session, session_from_bytes, session_to_bytes
 from handey_studio.session.run import cell_of
 from handey_studio.session.sequence import from_the_start, next_command, run_list, skipped, states_of
@@ -44,7 +46,39 @@ def test_a_failure_stops_the_list_or_not_and_can_be_skipped():
     assert statuses(stopped) == ["failed", "waiting"] and next_command(stopped) == 0
     session = run_list(skipped(stopped, 0), LIBRARY, Watching())
     assert statuses(session) == ["skipped", "done"] and session.results[states_of(session)[1].result].command == FIRST
-    assert statuses(run_list(fresh(NOWHERE, NOWHERE), LIBRARY, Watching(), go_on=True)) == ["failed", "failed"]
+    assert statuses(run_list(fresh(NOWHERE, NOWHERE), LIBRARY, Watching(), go_on=True)) == ["failed", "waiting"], "it is the same brick"
+
+
+def buried(*commands: MoveCommand) -> Session:
+    """A brick with a wedge on it."""
+    bare = workcell()
+    brick = bare.setup.bodies[0]
+    wedge = TrueBody("wedge", brick.T_world_body @ from_xyz_rpy((-0.03, -0.02, 0.015), (0.0, 0.0, 0.0)), part="wedge")
+    setup = replace(bare.setup, bodies=(brick, wedge))
+    parts = LIBRARY.part("brick"), LIBRARY.part("wedge")
+    return Session("list", replace(bare, parts=("brick", "wedge"), setup=setup), parts, commands)
+
+
+def test_what_lies_under_something_is_postponed_and_comes_back():
+    session, watching = buried(FIRST, MoveCommand("wedge", "0.36,-0.02,0")), Watching()
+    stepped = run_list(session, LIBRARY, watching, most=1)
+    assert statuses(stepped) == ["postponed", "waiting"] and next_command(stepped) == 1
+    assert "lies or leans on" in stepped.results[0].reason
+    session = session_from_bytes(session_to_bytes(stepped), "x")
+    ended = run_list(session, LIBRARY, watching)
+    assert statuses(ended) == ["done", "done"], [result.reason for result in ended.results]
+    assert [result.command.part for result in ended.results] == ["brick", "wedge", "brick"]
+
+
+def test_what_nothing_helps_has_failed_and_what_needs_it_waits():
+    alone = run_list(buried(FIRST, SECOND), LIBRARY, Watching())
+    assert statuses(alone) == ["failed", "waiting"], "SECOND is about the same brick"
+    upon = replace(
+        alone, commands=(FIRST, MoveCommand("wedge", "on:brick:top")), states=(CommandState("postponed", 0),), results=alone.results
+    )
+    assert next_command(upon) is None, "it stands on the part that the first one moves"
+    other = replace(upon, commands=(FIRST, MoveCommand("wedge", SECOND.to)))
+    assert next_command(other) == 1
 
 
 def test_cancelled_the_command_waits_again():

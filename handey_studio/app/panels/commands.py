@@ -24,6 +24,7 @@ SIGNS = {
     "waiting": ("○", palette.GREY),
     "running": ("●", palette.BLUE),
     "done": ("✓", palette.TEAL),
+    "postponed": ("↻", palette.ORANGE),
     "failed": ("✗", palette.VERMILLION),
     "skipped": ("–", palette.GREY),
 }
@@ -38,7 +39,10 @@ class CommandsPanel:
         self._edit = gui.add_button_group("List", (ADD, REMOVE, UP, DOWN))
         self._more = gui.add_button_group("Chosen", (SKIP, OVER), hint="Skip passes the chosen one over; Start over lets all wait again")
         self._run = gui.add_button(
-            "Run all", icon=viser.Icon.PLAYER_TRACK_NEXT_FILLED, color=palette.BLUE, hint="Until one fails or all are done"
+            "Run all",
+            icon=viser.Icon.PLAYER_TRACK_NEXT_FILLED,
+            color=palette.BLUE,
+            hint="What cannot be planned is postponed until others are done; ends when one goes wrong or nothing more can be done",
         )
         self._step = gui.add_button("Step", icon=viser.Icon.PLAYER_SKIP_FORWARD, color=palette.ARM_DARK, hint="Only the next command")
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color=palette.VERMILLION, visible=False)
@@ -58,7 +62,7 @@ class CommandsPanel:
         count, idle = len(new.session.commands), new.job is None
         self._first = max(0, min(new.command_number - ROWS // 2, count - ROWS))
         self._list.content = commands_html(new, self._first, [element_id(button) for button in self._rows])
-        begun = any(state.status in ("done", "failed", "skipped") for state in states_of(new.session))
+        begun = any(state.status in ("done", "postponed", "failed", "skipped") for state in states_of(new.session))
         left = next_command(new.session) is not None
         set_to(self._run, label=_run_label(new) if begun else "Run all", visible=idle and count > 0, disabled=not left)
         set_to(self._step, visible=idle and count > 0, disabled=not left)
@@ -88,8 +92,8 @@ def _row(state: State, number: int, told: CommandState, button: str) -> str:
     clipped = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     why = state.session.results[told.result].reason if told.result >= 0 else ""
     below = (
-        f'<div style="color:{palette.text(palette.VERMILLION)};padding-left:34px;font-size:11.5px;{TWO_LINES}">{html.esc(why)}</div>'
-        if told.status == "failed"
+        f'<div style="color:{palette.text(colour)};padding-left:34px;font-size:11.5px;{TWO_LINES}">{html.esc(why)}</div>'
+        if told.status in ("postponed", "failed")
         else ""
     )
     words = html.esc(arrow_words(command))
