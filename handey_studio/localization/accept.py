@@ -1,7 +1,7 @@
 """Accept: what is probable beside its rivals, then what explains the view jointly."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,9 @@ import numpy as np
 from handey_studio.localization.candidates import Candidate
 from handey_studio.localization.joint import SAME_READINGS, WITHIN, Rivals, explain_jointly, probabilities, rivals_among
 from handey_studio.localization.result import Hypothesis, LocatedPose, Rival, pose_matrix
+from handey_studio.localization.score import at_rest
 from handey_studio.localization.search import Search
+from handey_studio.localization.standing import held_up
 
 MOST_RIVALS = 60  # candidates that are weighed against one another
 RIVAL_FROM, TOLD_FROM = 0.01, 0.05  # how probable a pose must be alone to count as a rival, and beside the others to be told as one
@@ -45,8 +47,28 @@ class Weighing:
 
 
 def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPose], list[Hypothesis]]:
-    """The poses that stand, most probable first, and every candidate with why it fell: the accepted first, then by probability."""
+    """The poses that stand, most probable first, and every candidate with why it fell: the accepted first, then by probability.
+
+    What rests on those that stand is weighed again as a part that rests, until nothing more does; so are its rivals, as that something
+    rests there does not tell what.
+    """
     start = time.perf_counter()
+    weighing, falls, accepted = _chosen(search, candidates)
+    while held := held_up(search, weighing.candidates, accepted, search.options.min_score):
+        raised = {*held, *(k for n in held for k in weighing.against(n))}
+        resting = [replace(c, score=at_rest(search, c.score)) if n in raised else c for n, c in enumerate(weighing.candidates)]
+        weighing, falls, accepted = _chosen(search, resting)
+    _write_down(search, weighing.candidates, falls)
+    rejected = sorted(falls, key=lambda n: -weighing.probability[n])
+    poses = [_located(search, weighing, n) for n in accepted]
+    hypotheses = [_hypothesis(search, weighing, n, None) for n in accepted]
+    hypotheses += [_hypothesis(search, weighing, n, falls[n].reason) for n in rejected]
+    search.timing["accept"] = time.perf_counter() - start
+    return poses, hypotheses
+
+
+def _chosen(search: Search, candidates: list[Candidate]) -> tuple[Weighing, dict[int, Fall], list[int]]:
+    """How the candidates weigh against one another, why each fell, and the numbers of those that stand together, most probable first."""
     falls = {n: fall for n, candidate in enumerate(candidates) if (fall := _sunk(search, candidate)) is not None}
     weighing = _weighed(search, candidates, falls)
     # What shows too little to be told may still be what the readings are: it was weighed against the others.
@@ -54,14 +76,7 @@ def accept(search: Search, candidates: list[Candidate]) -> tuple[list[LocatedPos
     falls |= {
         n: _improbable(search, weighing, n) for n, p in enumerate(weighing.probability) if p < search.options.min_score and n not in falls
     }
-    accepted = _jointly(search, weighing, falls)
-    _write_down(search, candidates, falls)
-    rejected = sorted(falls, key=lambda n: -weighing.probability[n])
-    poses = [_located(search, weighing, n) for n in accepted]
-    hypotheses = [_hypothesis(search, weighing, n, None) for n in accepted]
-    hypotheses += [_hypothesis(search, weighing, n, falls[n].reason) for n in rejected]
-    search.timing["accept"] = time.perf_counter() - start
-    return poses, hypotheses
+    return weighing, falls, _jointly(search, weighing, falls)
 
 
 def _sunk(search: Search, candidate: Candidate) -> Fall | None:

@@ -18,6 +18,7 @@ from handey_studio.localization.fitted import TABLE
 from handey_studio.localization.search import Search
 from handey_studio.localization.second_look import Tally
 from handey_studio.localization.verify import Verdict
+from handey_studio.sensing.depth_view import DepthView
 from handey_studio.world.part import Part
 
 FEATURES = (
@@ -40,6 +41,8 @@ FEATURES = (
     "no three corners touch the table",
     "it does not rest on the table",  # 1 if three corners do, to within noise
 )
+FEET = slice(len(FEATURES) - 3, len(FEATURES))  # those that tell whether it rests
+ROOM_LEFT = FEET.start - 1  # the one that tells of the room below it
 LEAST_EDGE_M = 0.001  # a logarithm is taken of no less
 FINE_M, COARSE_M = 0.0008, 0.0012  # noise up to which the weights hold, and from which agreement decides
 AGREEMENT_WORTH, EVEN_AGREEMENT = 30.0, 0.853  # edges times readings that agree: how fast odds grow, and where they are even
@@ -140,9 +143,14 @@ def _of_footing(search: Search, part: Part, rated: Rated) -> NDArray:
     uncertain = TOUCHES * (view.noise + np.minimum(rated.sigma, search.slack))[:, None]
     below = np.clip(-height[:, :1] / search.slack, 0.0, 4.0)
     touches = np.where(np.isnan(height), np.nan, height < uncertain)
-    rests = np.where(np.isnan(height[:, 1:]), np.nan, np.abs(height[:, 1:]) < TOUCHES * view.noise + 0.25 * view.outline_error)
+    rests = np.where(np.isnan(height[:, 1:]), np.nan, np.abs(height[:, 1:]) < resting_within(view))
     room = np.clip(height[:, :1] / part.solid.diameter, 0.0, ROOM)
     return np.concatenate([below, room, touches, rests], axis=1)
+
+
+def resting_within(view: DepthView) -> float:
+    """How far [m] from what holds it up a part may seem to be that rests on it."""
+    return TOUCHES * view.noise + 0.25 * view.outline_error
 
 
 class Score(NamedTuple):
@@ -162,10 +170,26 @@ class Score(NamedTuple):
 def scores(search: Search, part: Part, rated: Rated) -> list[Score]:
     """How probable each pose is by itself."""
     found = features(search, part, rated)
-    doubts = np.argmin(FITTED.worth * (found - FITTED.typical), axis=1)
-    coarse = np.clip((search.view.noise - FINE_M) / (COARSE_M - FINE_M), 0.0, 1.0)
+    coarse = _coarse(search)
     odds = (1.0 - coarse) * (FITTED.intercept + found @ FITTED.worth) + coarse * _coarse_odds(search, rated)
-    return [Score(float(x), FEATURES[doubt], row) for x, doubt, row in zip(odds, doubts, found, strict=True)]
+    return [Score(float(x), _doubt(row), row) for x, row in zip(odds, found, strict=True)]
+
+
+def at_rest(search: Search, score: Score) -> Score:
+    """The score of a pose that rests on something else than the table."""
+    found = score.features.copy()
+    found[ROOM_LEFT], found[FEET] = 0.0, 1.0
+    return Score(score.odds + float((1.0 - _coarse(search)) * FITTED.worth @ (found - score.features)), _doubt(found), found)
+
+
+def _doubt(found: NDArray) -> str:
+    """What speaks most against a pose of features (k,)."""
+    return FEATURES[int(np.argmin(FITTED.worth * (found - FITTED.typical)))]
+
+
+def _coarse(search: Search) -> float:
+    """How far agreement alone decides, from 0 to 1."""
+    return float(np.clip((search.view.noise - FINE_M) / (COARSE_M - FINE_M), 0.0, 1.0))
 
 
 def _coarse_odds(search: Search, rated: Rated) -> NDArray:

@@ -25,8 +25,7 @@ from handey_studio.sensing.depth_map import SKY_M, DepthMap
 from handey_studio.world import Part, PlacedPart
 
 EXPLAINED_SIGMAS = 4.0  # a reading this many standard deviations from a part's surface is still the part's
-SLIVER_M = 0.006  # between a part's face and an open finger
-RIM_M = 0.0025  # what fingers at a part's side keep off the columns, and how much larger these are made
+SLIVER_M = 0.006  # what fingers need to close on a part: beside it to open, and under its rim to go along a side that leans
 BESIDE_M = 0.012  # within which readings tell of a part's rim
 AROUND = 2  # cells to each side that must be level around a lone reading
 
@@ -149,7 +148,7 @@ def _beside(depth_map: DepthMap, own: NDArray, footprint: NDArray) -> NDArray:
     found: Any = ndimage.distance_transform_edt(~seen, return_indices=True)
     distance, nearest = found
     inside: Any = ndimage.distance_transform_edt(footprint)
-    near = (inside * depth_map.cell <= RIM_M) & (distance * depth_map.cell <= BESIDE_M)
+    near = (inside * depth_map.cell <= SLIVER_M) & (distance * depth_map.cell <= BESIDE_M)
     return np.where(near, depth_map.elevation[nearest[0], nearest[1]], np.inf)
 
 

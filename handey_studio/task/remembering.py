@@ -82,7 +82,7 @@ def _borne_out(scene: Scene, found: Sequence[PlacedPart], known: Sequence[Placed
     kept = []
     for placed, depth in zip(known, drawn, strict=True):
         shows = inner(depth) & (depth <= front + AGREE_M)
-        own = shows & (np.abs(depth - view.depth) < AGREE_M) & (theirs > depth + AGREE_M)
+        own = (np.abs(depth[shows] - view.depth[shows]) < AGREE_M) & (theirs[shows] > depth[shows] + AGREE_M)
         if own.sum() >= max(LEAST_READINGS, SEEN_SHARE * shows.sum()):
             kept.append(placed)
     return kept
