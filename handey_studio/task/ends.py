@@ -35,11 +35,6 @@ class End(Value):
     def __post_init__(self) -> None:
         object.__setattr__(self, "q", frozen_array(self.q))
 
-    @property
-    def q_carried(self) -> NDArray:
-        """Where the part is clear of everything at this end: the transfer begins or ends there."""
-        ...
-
 
 def reachable(grasp: Grasp, where: str, near: NDArray, ledger: Ledger) -> list[NDArray]:
     """Configurations (n,) that put the hand there within limits and clear of everything, nearest to `near` first."""
