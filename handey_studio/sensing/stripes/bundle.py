@@ -18,6 +18,7 @@ from handey_studio.sensing.stripes.stripe_camera import StripeCamera
 CAMERA = 9  # numbers: focal lengths, centre, and the lens's k1, k2, p1, p2, k3
 EACH = 40  # points of each stripe; nearer ones share their errors
 STEP = 1e-6  # of a number's scale, for derivatives
+SHARED = 3.0  # corners' deviations: a stripe's points are never better than that together, for what bends one bends its neighbours
 LEAST_PX = 0.01  # photographs never agree better; exact data has no scatter to weigh by
 STEPS, DAMPING, MOST_DAMPING, ENOUGH = 50, 1e-3, 1e6, 1e-7
 ROUNDS = 2  # of weighing corners and stripes by how well each agree
@@ -58,7 +59,8 @@ def bundle(
     numbers = start
     for _ in range(ROUNDS):
         missed, off = _residuals(numbers, seen, fit.camera)
-        weights = 1.0 / np.maximum([_deviation(missed), _deviation(off)], LEAST_PX)
+        deviation = max(_deviation(missed), LEAST_PX)
+        weights = 1.0 / np.array([deviation, max(_deviation(off), SHARED * deviation)])
         numbers = _fitted(numbers, free, scale, seen, fit.camera, weights)
     return _unpacked(numbers, fit, seen)
 
